@@ -24,6 +24,7 @@ from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.movement import MovementPage, MovementStep
 from rhot_app.ui.wizards.framework.page import ChartPage, Page
@@ -50,15 +51,15 @@ def make_wizard(context: WizardContext, poses: PoseFeed | None = None,
                 now_ns: Callable[[], int] = time.monotonic_ns) -> Definition:
     """Connect, move both, look at the fit, use it. `poses` hears the other tracker; `now_ns` is the master's clock."""
     if context.listen is None:
-        raise EngineError("this window cannot hear the hand; open the wizard from the main window.")
+        raise EngineError(tr("this window cannot hear the hand; open the wizard from the main window."))
     states, poses = StateFeed(context.listen), poses or PoseFeed()
     simulated = simulated_kind(context.now.path)
     source = SourceStep(KINDS if simulated is None else (simulated, *KINDS), poses)
     together = TogetherStep(context.rig.markers.ids, poses, states.recent, now_ns)
     solve = SolveStep(context.calibration, context.now,
                       lambda: None if together.recording is None else (together.recording, SEARCH_S),
-                      "Aligning both trackers …")
-    accept = accept_result(context, solve, "Record a movement of both first.")
+                      tr("Aligning both trackers …"))
+    accept = accept_result(context, solve, tr("Record a movement of both first."))
 
     def end() -> None:
         poses.stop()
@@ -82,11 +83,12 @@ class SourceKind:
 
 
 KINDS: tuple[SourceKind, ...] = (
-    SourceKind("SteamVR", "openvr", "A Vive tracker, by SteamVR on this machine."),
-    SourceKind("libsurvive", "libsurvive", "A Vive tracker, by survive-cli on this machine."),
-    SourceKind("Program", "run:{}", "A program that prints a line for each pose.", "program and arguments"),
-    SourceKind("UDP", "udp:{}", "Lines that a program sends to this port.", "port"),
-    SourceKind("TCP", "tcp:{}", "A program that serves lines.", "host:port"))
+    SourceKind("SteamVR", "openvr", tr_noop("A Vive tracker, by SteamVR on this machine.")),
+    SourceKind("libsurvive", "libsurvive", tr_noop("A Vive tracker, by survive-cli on this machine.")),
+    SourceKind(tr_noop("Program"), "run:{}", tr_noop("A program that prints a line for each pose."),
+               tr_noop("program and arguments")),
+    SourceKind("UDP", "udp:{}", tr_noop("Lines that a program sends to this port."), "port"),
+    SourceKind("TCP", "tcp:{}", tr_noop("A program that serves lines."), "host:port"))
 
 
 def simulated_kind(rig_path: Path | None) -> SourceKind | None:
@@ -98,13 +100,13 @@ def simulated_kind(rig_path: Path | None) -> SourceKind | None:
     if not (rig_path.parent / SERVER_NAME).exists():
         return None
     command = shlex.join([sys.executable, "-m", "rhot_app.simulator.nodes.tracker", str(rig_path.parent)])
-    return SourceKind("Simulated", f"run:{command}", "A tracker on the simulated index fingertip.")
+    return SourceKind("Simulated", f"run:{command}", tr("A tracker on the simulated index fingertip."))
 
 
 class SourceStep(Step):
     """A source is chosen and listened to. `kind`, `detail` and `tracker` are as entered."""
 
-    title = "The tracker"
+    title = tr_noop("The tracker")
 
     def __init__(self, kinds: Sequence[SourceKind], feed: PoseFeed) -> None:
         self.kinds, self.feed = tuple(kinds), feed
@@ -117,12 +119,13 @@ class SourceStep(Step):
     def view(self) -> StepView:
         """Whether poses come."""
         if not self.feed.opened:
-            return StepView("Choose the other tracker, switch it on, then connect.")
+            return StepView(tr("Choose the other tracker, switch it on, then connect."))
         rate_hz = self.feed.rate_hz
-        bars = (Bar("poses", min(rate_hz / LEAST_HZ, 1.0), f"{LEAST_HZ:.0f} or more a second"),)
+        bars = (Bar("poses", min(rate_hz / LEAST_HZ, 1.0), tr("{least_hz:.0f} or more a second", least_hz=LEAST_HZ)),)
         if rate_hz >= LEAST_HZ:
-            return StepView(f"{rate_hz:.0f} poses a second. Go on.", done=True, bars=bars, hint=self.feed.notice)
-        return StepView("Waiting for poses.", bars=bars, hint=self.feed.notice)
+            return StepView(tr("{rate_hz:.0f} poses a second. Go on.", rate_hz=rate_hz), done=True, bars=bars,
+                            hint=self.feed.notice)
+        return StepView(tr("Waiting for poses."), bars=bars, hint=self.feed.notice)
 
 
 class MotionGuide:
@@ -162,7 +165,7 @@ class MotionGuide:
 
     def sentence(self) -> str:
         """What is missing most."""
-        return advice(self._coverage) or "Good, go on."
+        return advice(self._coverage) or tr("Good, go on.")
 
     def shortfall(self) -> str:
         """The same; "" when nothing is."""
@@ -176,8 +179,9 @@ class TogetherStep(MovementStep):
                  now_ns: Callable[[], int] = time.monotonic_ns) -> None:
         """`recent` gives the hand's states of the last seconds."""
         super().__init__(
-            Movement("Move both", "Tie the tracker to the finger. Press Record, then move and turn both, irregularly.",
-                     SECONDS, lambda: MotionGuide(feed, self.marker, now_ns), "Moves and turns."),
+            Movement(tr("Move both"),
+                     tr("Tie the tracker to the finger. Press Record, then move and turn both, irregularly."), SECONDS,
+                     lambda: MotionGuide(feed, self.marker, now_ns), tr("Moves and turns.")),
             Path(), lambda: recent(4.0), lambda: 1e-9 * now_ns())
         self.markers, self.feed = tuple(markers), feed
         self.marker = self.markers.index("index") if "index" in self.markers else 0
@@ -209,10 +213,10 @@ class TogetherStep(MovementStep):
 
     def _missing(self) -> str:
         if not self.feed.between(self._now_ns() - _RECENT_NS, self._now_ns()):
-            return self.feed.notice or "The tracker gives no poses. Go back and connect it."
+            return self.feed.notice or tr("The tracker gives no poses. Go back and connect it.")
         if not self.seen():
-            return (f"The marker {self.markers[self.marker]} is not seen by two cameras. Hold it before them, or "
-                    "choose another one.")
+            return (tr("The marker {markers} is not seen by two cameras. Hold it before them, or choose another one.",
+                       markers=self.markers[self.marker]))
         return ""
 
     def view(self) -> StepView:
@@ -228,22 +232,25 @@ def bars_of(coverage: Coverage | None) -> tuple[Bar, ...]:
     turn, reach, speed = (0.0, 0.0, 0.0) if coverage is None else (
         float(coverage.turn[0]) / ENOUGH_RAD, float(np.linalg.norm(coverage.spread_m[1:])) / ENOUGH_M,
         coverage.speed_m_s / ENOUGH_M_S)
-    return (Bar("turn", min(turn, 1.0), f"of the tracker about two axes, {np.degrees(ENOUGH_RAD):.0f} degrees rms"),
-            Bar("reach", min(reach, 1.0), f"of the finger across its longest way, {1e3 * ENOUGH_M:.0f} mm rms"),
-            Bar("speed", min(speed, 1.0), f"of the finger, {1e3 * ENOUGH_M_S:.0f} mm/s rms"))
+    return (Bar(tr("turn"), min(turn, 1.0),
+                tr("of the tracker about two axes, {degrees:.0f} degrees rms", degrees=np.degrees(ENOUGH_RAD))),
+            Bar("reach", min(reach, 1.0),
+                tr("of the finger across its longest way, {enough_m:.0f} mm rms", enough_m=1000.0 * ENOUGH_M)),
+            Bar("speed", min(speed, 1.0),
+                tr("of the finger, {enough_m_s:.0f} mm/s rms", enough_m_s=1000.0 * ENOUGH_M_S)))
 
 
 def advice(coverage: Coverage | None) -> str:
     """Which motion is missing most; "" when none is."""
     if coverage is None:
-        return "Keep the marker in view."
+        return tr("Keep the marker in view.")
     if coverage.turn[2] < ENOUGH_RAD:
-        return "Turn the tracker while you move it."
+        return tr("Turn the tracker while you move it.")
     if coverage.turn[0] < ENOUGH_RAD:
-        return "Turn it about a second axis, too."
+        return tr("Turn it about a second axis, too.")
     if np.linalg.norm(coverage.spread_m[1:]) < ENOUGH_M:
-        return "Move farther: up and down, left and right, near and far."
-    return "" if coverage.speed_m_s >= ENOUGH_M_S else "Move faster."
+        return tr("Move farther: up and down, left and right, near and far.")
+    return "" if coverage.speed_m_s >= ENOUGH_M_S else tr("Move faster.")
 
 
 # -- pages -------------------------------------------------------------------------------------------------------------
@@ -257,16 +264,16 @@ class SourcePage(Page):
         self.kind, self.detail, self.tracker = QComboBox(), QLineEdit(), QLineEdit()
         self.kind.addItems([kind.label for kind in step.kinds])
         self.kind.currentIndexChanged.connect(self._choose)
-        self.tracker.setPlaceholderText("the only one")
-        self.tracker.setToolTip("Serial number, name or role. Empty: the only one.")
+        self.tracker.setPlaceholderText(tr("the only one"))
+        self.tracker.setToolTip(tr("Serial number, name or role. Empty: the only one."))
         self.meaning = Sentence(2, muted=True)
-        self.connect_button = QPushButton("Connect")
+        self.connect_button = QPushButton(tr("Connect"))
         self.connect_button.setAutoDefault(False)
         self.connect_button.clicked.connect(self._connect)
         self.heard = QLabel()
         self.heard.setWordWrap(True)
         self.form = QFormLayout()
-        for label, field in (("Source", self.kind), ("Where", self.detail), ("Tracker", self.tracker)):
+        for label, field in ((tr("Source"), self.kind), (tr("Where"), self.detail), (tr("Tracker"), self.tracker)):
             self.form.addRow(label, field)
         self.column.addLayout(self.form)
         for widget in (self.meaning, self.connect_button, self.heard):
@@ -283,11 +290,12 @@ class SourcePage(Page):
     def show_view(self, view: StepView) -> None:
         """What is heard."""
         feed = self.source.feed
-        self.heard.setText(f"{feed.name[:60]}: {feed.rate_hz:.0f} poses a second" if feed.opened else "")
+        self.heard.setText(tr("{name}: {rate_hz:.0f} poses a second", name=feed.name[:60], rate_hz=feed.rate_hz)
+                           if feed.opened else "")
 
     def _choose(self, index: int) -> None:
         self.source.kind = kind = self.source.kinds[index]
-        self.meaning.setText(kind.meaning)
+        self.meaning.setText(tr(kind.meaning))
         self.detail.setPlaceholderText(kind.detail)
         self.detail.setEnabled(bool(kind.detail))
 
@@ -305,20 +313,20 @@ class TogetherPage(MovementPage):
     """Records both."""
 
     def __init__(self, step: TogetherStep, states: StateFeed, context: WizardContext) -> None:
-        super().__init__(step, context.connect, states, "What both show is kept until this window closes.")
+        super().__init__(step, context.connect, states, tr("What both show is kept until this window closes."))
         self._job: Job | None = None
         self._connect = context.connect
         self.marker = QComboBox()
         self.marker.addItems(list(step.markers))
         self.marker.setCurrentIndex(step.marker)
-        self.marker.setToolTip("The marker that the tracker is tied to.")
+        self.marker.setToolTip(tr("The marker that the tracker is tied to."))
         self.marker.currentIndexChanged.connect(self._choose)
         self.together = step
         form = QFormLayout()
-        form.addRow("Marker", self.marker)
+        form.addRow(tr("Marker"), self.marker)
         self.column.insertLayout(0, form)
         self.first_field = self.button
-        self.twin_facts = "Moves and turns."
+        self.twin_facts = tr("Moves and turns.")
 
     def entered(self) -> None:
         """Hear the hand from now on; have a resting engine track."""

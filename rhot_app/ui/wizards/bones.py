@@ -23,6 +23,7 @@ from rhot_app.hand.skeleton import BONES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.common.record_table import RecordTable
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.movement import Movements, QuietGuide
@@ -40,9 +41,9 @@ def make_wizard(context: WizardContext) -> Definition:
     movements, rig = Movements(context), context.rig
     entry = EntryStep(rig.hand)
     page = movements.page(Movement(
-        "Move freely", "Press Record, then bend and stretch every finger and turn the hand.", SECONDS,
-        lambda: make_guide(rig), "Moves every joint: all of them within the minute."))
-    page.movement.unneeded = lambda: "Press Next: the bones were entered." if entry.result is not None else ""
+        tr("Move freely"), tr("Press Record, then bend and stretch every finger and turn the hand."), SECONDS,
+        lambda: make_guide(rig), tr("Moves every joint: all of them within the minute.")))
+    page.movement.unneeded = lambda: tr("Press Next: the bones were entered.") if entry.result is not None else ""
 
     def measured() -> tuple[Any, ...] | Done | None:
         if entry.result is not None:
@@ -50,8 +51,8 @@ def make_wizard(context: WizardContext) -> Definition:
         log = page.movement.log
         return None if log is None else (log, entry.base)
 
-    hand = SolveStep(context.calibration, context.now, measured, "Fitting the hand …")
-    accept = accept_result(context, hand, "Record the movement first.")
+    hand = SolveStep(context.calibration, context.now, measured, tr("Fitting the hand …"))
+    accept = accept_result(context, hand, tr("Record the movement first."))
     return Definition((EntryPage(entry), page, HandPage(hand, context.scheme), accept), put_back=movements.end)
 
 
@@ -63,7 +64,7 @@ Side = Literal["right", "left"]
 class EntryStep(Step):
     """The first page: which hand, and the bones that were measured with a ruler, in mm; none means: by movement."""
 
-    title = "Your hand"
+    title = tr_noop("Your hand")
 
     def __init__(self, hand: HandAnatomy) -> None:
         self._hand = hand
@@ -135,11 +136,11 @@ class EntryStep(Step):
     def view(self) -> StepView:
         """Either way is right."""
         if self.problem:
-            return StepView("Mend what was entered.", hint=self.problem)
+            return StepView(tr("Mend what was entered."), hint=self.problem)
         if self.result is None:
-            return StepView("Press Next to measure by movement.", done=True,
-                            hint="Or enter bones that you have measured with a ruler, joint to joint.")
-        return StepView("Press Next: the bones are as entered.", done=True, verdict=self.result.verdict)
+            return StepView(tr("Press Next to measure by movement."), done=True,
+                            hint=tr("Or enter bones that you have measured with a ruler, joint to joint."))
+        return StepView(tr("Press Next: the bones are as entered."), done=True, verdict=self.result.verdict)
 
 
 class SweepGuide:
@@ -179,14 +180,16 @@ class SweepGuide:
         from rhot_app.calibration.hand.bones_collector import LEAST_S
 
         progress = self._collector.progress
-        fingers = (Bar(finger.finger, finger.fraction, f"bent and stretched {finger.sweeps} times; how far shows when "
-                       "the hand is fitted") for finger in progress.fingers if finger.seen)
-        return (Bar("in sight", min(progress.seconds / LEAST_S, 1.0), f"of {LEAST_S:.0f} s in which the cameras see "
-                    "the markers together"), *fingers)
+        fingers = (Bar(finger.finger, finger.fraction,
+                       tr("bent and stretched {sweeps} times; how far shows when the hand is fitted",
+                          sweeps=finger.sweeps)) for finger in progress.fingers if finger.seen)
+        return (Bar(tr("in sight"), min(progress.seconds / LEAST_S, 1.0),
+                    tr("of {least_s:.0f} s in which the cameras see the markers together", least_s=LEAST_S)), *fingers)
 
     def sentence(self) -> str:
         """What to do next."""
-        return self._collector.progress.sentence if self._collector is not None else "Show the hand to both cameras."
+        return self._collector.progress.sentence if self._collector is not None else tr("Show the hand to both "
+                                                                                        "cameras.")
 
     def shortfall(self) -> str:
         """What has not moved enough."""
@@ -199,7 +202,7 @@ def make_guide(rig: Rig) -> Guide:
     try:
         tracks_of(np.zeros(1), np.zeros((1, len(rig.markers.ids), 3)), rig.markers.ids, roles, painted=painted)
     except CalibrationError:
-        return QuietGuide("Bend and stretch every finger.")
+        return QuietGuide(tr("Bend and stretch every finger."))
     return SweepGuide(rig)
 
 
@@ -210,7 +213,7 @@ def knowledge_of(bone: BoneLength) -> str:
 
 # -- the pages of the bones wizard -------------------------------------------------------------------------------------
 
-_SIDES = (("right", "Right hand"), ("left", "Left hand"))
+_SIDES = (("right", tr_noop("Right hand")), ("left", tr_noop("Left hand")))
 _ROW_PX = 30
 _BOX_PX = 120
 _LONGEST_MM = 400.0
@@ -226,16 +229,16 @@ class EntryPage(Page):
         self._filling = False
         self.side = QComboBox()
         for value, text in _SIDES:
-            self.side.addItem(text, value)
-        self.side.setToolTip("Which hand wears the markers.")
+            self.side.addItem(tr(text), value)
+        self.side.setToolTip(tr("Which hand wears the markers."))
         self.boxes = {name: self._box(name) for name in BONE_NAMES}
-        self.undo_button = QPushButton("Undo")
+        self.undo_button = QPushButton(tr("Undo"))
         self.undo_button.setAutoDefault(False)
-        self.undo_button.setToolTip("Ctrl+Z. What was entered last.")
+        self.undo_button.setToolTip(tr("Ctrl+Z. What was entered last."))
         self.undo_button.clicked.connect(self._undo)
         self.centre = self._form()
-        note = QLabel("Most people leave this page as it is: a minute of movement shows the lengths, and how well. A "
-                      "ruler helps where too few markers are worn.")
+        note = QLabel(tr("Most people leave this page as it is: a minute of movement shows the lengths, and how well. "
+                         "A ruler helps where too few markers are worn."))
         note.setWordWrap(True)
         note.setProperty("muted", True)
         for widget in (self.side, note, self.undo_button):
@@ -250,7 +253,7 @@ class EntryPage(Page):
         grid = QGridLayout(form)
         grid.setContentsMargins(16, 16, 16, 16)
         grid.setSpacing(8)
-        for column, head in enumerate(("", "first bone", "second bone", "last bone, to the tip")):
+        for column, head in enumerate(("", tr("first bone"), tr("second bone"), tr("last bone, to the tip"))):
             label = QLabel(head)
             label.setWordWrap(True)
             grid.addWidget(label, 0, column)
@@ -270,8 +273,8 @@ class EntryPage(Page):
         box.setKeyboardTracking(False)
         box.setAccessibleName(name)
         box.setMinimumWidth(_BOX_PX)
-        box.setToolTip(f"{name.replace('.', ', ')}: from the middle of one joint to that of the next, finger bent. "
-                       f"{self._entry.usual(name):.0f} mm in the hand now in use.")
+        box.setToolTip(tr("{name}: from the middle of one joint to that of the next, finger bent. {usual:.0f} mm in "
+                          "the hand now in use.", name=name.replace(".", ", "), usual=self._entry.usual(name)))
         box.valueChanged.connect(lambda value: self._take(name, value))
         return box
 
@@ -315,9 +318,9 @@ class HandPage(Page):
         self.centre = self.table
         self.reaches = QLabel()
         self.reaches.setWordWrap(True)
-        self.reaches.setToolTip("From the wrist over the finger's root to its stretched tip.")
-        legend = QLabel("Solid: the markers show it. Translucent: they show it in part. Hatched: they do not; the "
-                        "length is what is usual for a hand of this size.")
+        self.reaches.setToolTip(tr("From the wrist over the finger's root to its stretched tip."))
+        legend = QLabel(tr("Solid: the markers show it. Translucent: they show it in part. Hatched: they do not; the "
+                           "length is what is usual for a hand of this size."))
         legend.setWordWrap(True)
         legend.setProperty("muted", True)
         self.column.addWidget(legend)
@@ -331,7 +334,8 @@ class HandPage(Page):
             return
         self._shown = result
         self._show_bones()
-        self.reaches.setText("" if result is None else "Reach: " + ", ".join(
+        self.reaches.setText("" if result is None else tr("Reach: ")
+                             + ", ".join(
             f"{reach.finger} {reach.length_mm:.0f} ± {reach.std_mm:.0f}" for reach in result.reaches) + " mm")
 
     def _show_bones(self) -> None:

@@ -25,6 +25,7 @@ from rhot_app.project import RigNode
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.control_row import Control, ControlRow, Value
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
 from rhot_app.ui.wizards.framework.drawing import Layer, Line, Overlay
@@ -42,7 +43,8 @@ def make_wizard(context: WizardContext) -> Definition:
     choices = CameraChoices(context.rig.nodes, context.now.node_settings)
     step = SettingsStep(choices, context.rig.markers)
     tryout = Tryout(context.connect)
-    last = accept_page(context, step.propose, "No picture shows these settings yet, or they cannot be used: go back.")
+    last = accept_page(context, step.propose,
+                       tr("No picture shows these settings yet, or they cannot be used: go back."))
     accept = last.accept
     page = CameraPage(step, tryout)
     tryout.setParent(page)
@@ -71,10 +73,10 @@ class CameraPage(Page):
         self._tryout = tryout
         self._shown: object = None
         self.which = QComboBox()
-        self.which.setToolTip("Whose settings are turned. Both at once keeps equal cameras equal.")
+        self.which.setToolTip(tr("Whose settings are turned. Both at once keeps equal cameras equal."))
         choices = step.choices
         if len(choices.nodes) > 1:
-            self.which.addItem("All cameras", tuple(node.node_id for node in choices.nodes))
+            self.which.addItem(tr("All cameras"), tuple(node.node_id for node in choices.nodes))
         for node in choices.nodes:
             self.which.addItem(node.name, (node.node_id,))
         self.rows = {control.field: ControlRow(control) for control in CONTROLS}
@@ -90,13 +92,13 @@ class CameraPage(Page):
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)
         scroll.setWidget(knobs)
-        self.balance_button = QPushButton("Balance on grey")
-        self.balance_button.setToolTip("Drag over something grey or white in a picture first, a sheet of paper for "
-                                       "instance. Press again until nothing changes.")
+        self.balance_button = QPushButton(tr("Balance on grey"))
+        self.balance_button.setToolTip(tr("Drag over something grey or white in a picture first, a sheet of paper for "
+                                          "instance. Press again until nothing changes."))
         self.balance_button.setAutoDefault(False)
         self.balance_button.clicked.connect(self._balance)
-        self.undo_button = QPushButton("Undo")
-        self.undo_button.setToolTip("Ctrl+Z. The last change back.")
+        self.undo_button = QPushButton(tr("Undo"))
+        self.undo_button.setToolTip(tr("Ctrl+Z. The last change back."))
         self.undo_button.setAutoDefault(False)
         self.undo_button.clicked.connect(self._undo)
         self.problem = QLabel()
@@ -160,7 +162,8 @@ class CameraPage(Page):
         for row in self.rows.values():
             values = {choices.value(node_id, row.control) for node_id in self.chosen}
             row.fill(choices.value(self.chosen[0], row.control) if self.chosen else None)
-            row.check_box.setText(row.control.name if len(values) < 2 else f"{row.control.name} (they differ)")
+            row.check_box.setText(tr(row.control.name) if len(values) < 2
+                                  else tr("{name} (they differ)", name=tr(row.control.name)))
         self.undo_button.setEnabled(choices.undoable)
 
 
@@ -233,21 +236,25 @@ def try_settings(asker: Asker, node_id: int, settings: Settings) -> None:
 # -- what is told to whom, and what the pictures say to it -------------------------------------------------------------
 
 CONTROLS: tuple[Control, ...] = (
-    Control("exposure_us", "Exposure time", "How long each row collects light. Short keeps moving markers sharp; a "
-            "multiple of the mains' half period (10 ms at 50 Hz, 8.33 ms at 60 Hz) keeps lamps from flickering.",
-            0.1, 33.0, 1000.0, 4.0, unit=" ms", scale=1000.0, optional=False, logarithmic=True, least=0.01),
-    Control("gain", "Gain", "Amplifies the signal, and its noise. Raise it only when light and exposure cannot be.",
-            1.0, 16.0, 1000.0, 1.0, logarithmic=True, least=0.01),
-    Control("brightness", "Brightness", "Added to every pixel. 0 leaves it; it brings no light, so change it last.",
-            -1.0, 1.0, 255.0, 0.0, least=-255.0),
-    Control("contrast", "Contrast", "Spreads the grey levels about the middle; 1 leaves them.",
-            0.0, 4.0, 255.0, 1.0, least=0.0),
-    Control("saturation", "Saturation", "How strong colours are; 1 leaves them, more sets the markers apart from grey.",
-            0.0, 4.0, 255.0, 1.0, least=0.0),
-    Control("red_gain", "Red gain", "White balance: raise it when white looks green or blue.",
-            0.2, 8.0, 1000.0, 1.0, logarithmic=True, least=0.01),
-    Control("blue_gain", "Blue gain", "White balance: raise it when white looks yellow or red.",
-            0.2, 8.0, 1000.0, 1.0, logarithmic=True, least=0.01),
+    Control("exposure_us", tr_noop("Exposure time"),
+            tr_noop("How long each row collects light. Short keeps moving markers sharp; a multiple of the mains' half "
+                    "period (10 ms at 50 Hz, 8.33 ms at 60 Hz) keeps lamps from flickering."), 0.1, 33.0, 1000.0, 4.0,
+            unit=" ms", scale=1000.0, optional=False, logarithmic=True, least=0.01),
+    Control("gain", tr_noop("Gain"),
+            tr_noop("Amplifies the signal, and its noise. Raise it only when light and exposure cannot be."), 1.0, 16.0,
+            1000.0, 1.0, logarithmic=True, least=0.01),
+    Control("brightness", tr_noop("Brightness"),
+            tr_noop("Added to every pixel. 0 leaves it; it brings no light, so change it last."), -1.0, 1.0, 255.0, 0.0,
+            least=-255.0),
+    Control("contrast", tr_noop("Contrast"), tr_noop("Spreads the grey levels about the middle; 1 leaves them."), 0.0,
+            4.0, 255.0, 1.0, least=0.0),
+    Control("saturation", tr_noop("Saturation"),
+            tr_noop("How strong colours are; 1 leaves them, more sets the markers apart from grey."), 0.0, 4.0, 255.0,
+            1.0, least=0.0),
+    Control("red_gain", tr_noop("Red gain"), tr_noop("White balance: raise it when white looks green or blue."), 0.2,
+            8.0, 1000.0, 1.0, logarithmic=True, least=0.01),
+    Control("blue_gain", tr_noop("Blue gain"), tr_noop("White balance: raise it when white looks yellow or red."), 0.2,
+            8.0, 1000.0, 1.0, logarithmic=True, least=0.01),
 )
 
 
@@ -312,7 +319,7 @@ class CameraChoices:
     def rows(self, nodes: tuple[RigNode, ...]) -> tuple[Row, ...]:
         """Every setting of these cameras before and after."""
         return tuple(
-            Row(f"{node.name}: {control.name.lower()}", value_text(control, self.before[node.node_id]),
+            Row(f"{node.name}: {tr(control.name).lower()}", value_text(control, self.before[node.node_id]),
                 value_text(control, self.now[node.node_id]))
             for node in nodes for control in CONTROLS)
 
@@ -321,7 +328,7 @@ def value_text(control: Control, settings: CameraSettings) -> str:
     """A setting with its unit, in words when it is left to the camera."""
     value = getattr(settings, control.field)
     if value is None:
-        return "left to the camera"
+        return tr("left to the camera")
     return f"{float(value) / control.scale:.{control.decimals}f}{control.unit}"
 
 
@@ -380,7 +387,7 @@ class CameraEye:
 class SettingsStep(Step):
     """Knobs, live pictures, advice. Nothing is saved; the last step does that."""
 
-    title = "Settings"
+    title = tr_noop("Settings")
     watches = True
 
     def __init__(self, choices: CameraChoices, markers: MarkerSet) -> None:
@@ -485,8 +492,8 @@ class SettingsStep(Step):
         if not advice:
             return None
         summary = "; ".join(f"{name} {one.exposure.summary}" for name, one in advice.items())
-        missing = [Finding("no_picture", Grade.POOR, f"No picture comes from {name}.", "", "Look at the Nodes panel.")
-                   for name in self._silent]
+        missing = [Finding("no_picture", Grade.POOR, tr("No picture comes from {name}.", name=name), "",
+                           tr("Look at the Nodes panel.")) for name in self._silent]
         return judge(f"{summary}.", [*missing, *(_of(name, finding) for name, one in advice.items()
                                                  for finding in one.verdict.findings)])
 
@@ -508,10 +515,11 @@ class SettingsStep(Step):
     def view(self) -> StepView:
         """What to turn, and why."""
         if not self.cameras:
-            return StepView("No camera answers.", hint="Look at the Nodes panel: its sentence says what is wrong.")
+            return StepView(tr("No camera answers."),
+                            hint=tr("Look at the Nodes panel: its sentence says what is wrong."))
         verdict, good = self.verdict, self._good
-        sentence = ("The pictures are good: press Next." if good else
-                    "Show the hand with its markers, and turn the knobs until the verdict is good.")
+        sentence = (tr("The pictures are good: press Next.") if good
+                    else tr("Show the hand with its markers, and turn the knobs until the verdict is good."))
         return StepView(sentence, done=good, hint=self._problem, verdict=verdict,
                         annotated={name: look.annotated for name, look in self._looks.items()}, passable=self._current)
 
@@ -527,7 +535,8 @@ class SettingsStep(Step):
                 if self.verdict.acceptable else None
         verdict = self.verdict
         if verdict.grade is Grade.POOR and self._before is Grade.POOR:
-            verdict = judge(f"{verdict.sentence.partition(': ')[2]} The settings in force are no better.",
+            verdict = judge(tr("{partition} The settings in force are no better.",
+                               partition=verdict.sentence.partition(": ")[2]),
                             [replace(finding, grade=Grade.FAIR) for finding in verdict.findings])
         return Proposal(CAMERA.reason, verdict, self.choices.rows(self.choices.changed), changes=tuple(
                             NodeChange(node.node_id, *self.choices.differences(node.node_id))

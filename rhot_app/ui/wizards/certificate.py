@@ -20,6 +20,7 @@ from rhot_app.certificate.recordings import FlashStep, PlumbStep, ProtocolFile, 
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.movement import MovementPage, Movements, MovementStep, QuietGuide, Request
@@ -29,7 +30,8 @@ from rhot_app.ui.wizards.framework.step import AcceptStep, SolveStep, StepView
 _FLASH_STEP_MS = 4  # a quarter of a 60 Hz screen's frame
 _SEED = 7
 
-_SIDES = (("Palm to the cameras", "palm"), ("Back to the cameras", "back"), ("A board, no hand", None))
+_SIDES = ((tr_noop("Palm to the cameras"), "palm"), (tr_noop("Back to the cameras"), "back"),
+          (tr_noop("A board, no hand"), None))
 
 
 def make_wizard(context: WizardContext) -> Definition:
@@ -39,11 +41,11 @@ def make_wizard(context: WizardContext) -> Definition:
     said = Statements(context.rig, rod_markers=(ids[0], ids[1 % len(ids)]), flash_marker=ids[0])
 
     folder, recent = movements.folder, movements.states.recent
-    made = {"static": movements.add(CertificateStep("static", "Hold still.", folder, recent)),
-            "ruler": movements.add(RulerDistances("Hold still.", folder, recent, ids[0])),
-            "rod": movements.add(CertificateStep("rod", "Go on.", folder, recent)),
-            "flash": movements.add(CertificateStep("flash", "Go on.", folder, recent)),
-            "plumb": movements.add(CertificateStep("plumb", "Hold still.", folder, recent))}
+    made = {"static": movements.add(CertificateStep("static", tr("Hold still."), folder, recent)),
+            "ruler": movements.add(RulerDistances(tr("Hold still."), folder, recent, ids[0])),
+            "rod": movements.add(CertificateStep("rod", tr("Go on."), folder, recent)),
+            "flash": movements.add(CertificateStep("flash", tr("Go on."), folder, recent)),
+            "plumb": movements.add(CertificateStep("plumb", tr("Hold still."), folder, recent))}
     pages = (StillPage(made["static"], context.connect, movements.states, said),
              RulerPage(made["ruler"], context.connect, movements.states, ids),
              RodPage(made["rod"], context.connect, movements.states, said),
@@ -53,11 +55,11 @@ def make_wizard(context: WizardContext) -> Definition:
         protocol = said.protocol(made)
         return None if protocol == ProtocolFile(simulated=protocol.simulated) else (protocol,)
 
-    solve = SolveStep(context.calibration, context.now, recorded, "Measuring the recordings …")
+    solve = SolveStep(context.calibration, context.now, recorded, tr("Measuring the recordings …"))
     propose = context.calibration.propose
     assert propose is not None
     keep = KeepStep(lambda: None if solve.result is None else propose(solve.result, context.now), context.now.path,
-                    "Record a step first.")
+                    tr("Record a step first."))
     return Definition((*pages, ChartPage(solve, context.scheme), KeepPage(keep, context.scheme)),
                       put_back=movements.end)
 
@@ -65,13 +67,16 @@ def make_wizard(context: WizardContext) -> Definition:
 # -- steps -------------------------------------------------------------------------------------------------------------
 
 _SENTENCES: dict[str, str] = {
-    "static": "Rest your hand, palm to the cameras, fingers spread; or rest a board. Then press Record.",
-    "ruler": "Hold one marker still, read the ruler, type it, press Record. Eight distances, near to far.",
-    "rod": "Press Record, then move a rod with two markers slowly through the whole volume, turning it every way.",
-    "flash": "Turn the cameras to this screen, darken the room, press Record: the patch flashes for 20 seconds.",
-    "plumb": "Hang the rod from a string. When it is still, press Record.",
+    "static": tr_noop("Rest your hand, palm to the cameras, fingers spread; or rest a board. Then press Record."),
+    "ruler": tr_noop("Hold one marker still, read the ruler, type it, press Record. Eight distances, near to far."),
+    "rod": tr_noop("Press Record, then move a rod with two markers slowly through the whole volume, turning it every "
+                   "way."),
+    "flash": tr_noop("Turn the cameras to this screen, darken the room, press Record: the patch flashes for 20 "
+                     "seconds."),
+    "plumb": tr_noop("Hang the rod from a string. When it is still, press Record."),
 }
-TITLES: dict[str, str] = {"static": "Still", "ruler": "Ruler", "rod": "Rod", "flash": "Flash", "plumb": "Plumb line"}
+TITLES: dict[str, str] = {"static": tr_noop("Still"), "ruler": tr_noop("Ruler"), "rod": tr_noop("Rod"),
+                          "flash": tr_noop("Flash"), "plumb": tr_noop("Plumb line")}
 
 
 class CertificateStep(MovementStep):
@@ -79,8 +84,8 @@ class CertificateStep(MovementStep):
 
     def __init__(self, name: str, sentence: str, folder: Path, recent: Callable[[], Sequence[Any]]) -> None:
         """`sentence` is said while it is recorded."""
-        super().__init__(Movement(TITLES[name], _SENTENCES[name], SECONDS[name], lambda: QuietGuide(sentence)), folder,
-                         recent)
+        super().__init__(Movement(tr(TITLES[name]), tr(_SENTENCES[name]), SECONDS[name], lambda: QuietGuide(sentence)),
+                         folder, recent)
 
     def view(self) -> StepView:
         """One may always go on, but not while it is recorded."""
@@ -122,8 +127,9 @@ class RulerDistances(CertificateStep):
         view = super().view()
         if self.phase != "recorded":
             return view
-        return dataclasses.replace(view, sentence=f"{len(self.rows)} distances. Type the next one and press Record, or "
-                                   "go on.", done=len(self.rows) >= 4, kept=len(self.rows))
+        return dataclasses.replace(view,
+                                   sentence=tr("{rows} distances. Type the next one and press Record, or go on.",
+                                               rows=len(self.rows)), done=len(self.rows) >= 4, kept=len(self.rows))
 
 
 @dataclass
@@ -155,16 +161,16 @@ class Statements:
 class KeepStep(AcceptStep):
     """The last step: the lines, and the folder that they are written to."""
 
-    title = "Keep"
-    use_label = "Write the certificate"
+    title = tr_noop("Keep")
+    use_label = tr_noop("Write the certificate")
 
     def _sentence(self) -> str:
         if self.state == "used" and self.proposal is not None:
-            return "It is written."
+            return tr("It is written.")
         if self.state == "restored":
-            return "It is deleted."
+            return tr("It is deleted.")
         return super()._sentence() if self.state == "under way" or self.proposal is None else (
-            "Write the certificate, or go back and record a step again.")
+            tr("Write the certificate, or go back and record a step again."))
 
 
 # -- pages -------------------------------------------------------------------------------------------------------------
@@ -177,11 +183,11 @@ class StillPage(MovementPage):
         super().__init__(step, connect, states)
         self.facing = QComboBox()
         for text, side in _SIDES:
-            self.facing.addItem(text, side)
-        self.facing.setToolTip("A mirrored rig tracks smoothly and is wrong; this tells.")
+            self.facing.addItem(tr(text), side)
+        self.facing.setToolTip(tr("A mirrored rig tracks smoothly and is wrong; this tells."))
         self.facing.currentIndexChanged.connect(lambda: setattr(said, "facing", self.facing.currentData()))
         form = QFormLayout()
-        form.addRow("Hand", self.facing)
+        form.addRow(tr("Hand"), self.facing)
         self.column.insertLayout(0, form)
 
 
@@ -193,15 +199,16 @@ class RulerPage(MovementPage):
         super().__init__(step, connect, states)
         assert isinstance(step, RulerDistances)
         self.distances = step
-        self.marker = _marker_box(ids, 0, "The marker that is held along the ruler.",
+        self.marker = _marker_box(ids, 0, tr("The marker that is held along the ruler."),
                                   lambda name: setattr(step, "marker", name))
-        self.distance = _length_box(step.distance_mm, "From the line between both lenses straight ahead, by a ruler.",
+        self.distance = _length_box(step.distance_mm,
+                                    tr("From the line between both lenses straight ahead, by a ruler."),
                                     lambda value: setattr(step, "distance_mm", value))
         self.rows = QLabel()
         self.rows.setWordWrap(True)
         form = QFormLayout()
-        form.addRow("Marker", self.marker)
-        form.addRow("Distance", self.distance)
+        form.addRow(tr("Marker"), self.marker)
+        form.addRow(tr("Distance"), self.distance)
         self.column.insertLayout(0, form)
         self.column.insertWidget(self.column.count() - 1, self.rows)
         self.first_field = self.distance
@@ -210,9 +217,9 @@ class RulerPage(MovementPage):
         """What was taken."""
         super().show_view(view)
         if self.movement.phase == "recorded":
-            self.button.setText("Record")
+            self.button.setText(tr("Record"))
         self.rows.setText(", ".join(f"{row.distance_mm:g}" for row in self.distances.rows) + " mm"
-                          if self.distances.rows else "No distance yet.")
+                          if self.distances.rows else tr("No distance yet."))
 
 
 class RodPage(MovementPage):
@@ -222,15 +229,16 @@ class RodPage(MovementPage):
                  said: Statements) -> None:
         super().__init__(step, connect, states)
         ids = said.rig.markers.ids
-        self.length = _length_box(said.rod_mm, "From the centre of one marker to the centre of the other, by a ruler.",
+        self.length = _length_box(said.rod_mm,
+                                  tr("From the centre of one marker to the centre of the other, by a ruler."),
                                   lambda value: setattr(said, "rod_mm", value))
         self.upper_end, self.lower_end = (
-            _marker_box(ids, k, "The end that is above when the rod hangs." if k == 0 else "The other end.",
+            _marker_box(ids, k, tr("The end that is above when the rod hangs.") if k == 0 else tr("The other end."),
                         lambda _: self._name(said)) for k in (0, 1))
         form = QFormLayout()
-        form.addRow("Length", self.length)
-        form.addRow("Upper marker", self.upper_end)
-        form.addRow("Lower marker", self.lower_end)
+        form.addRow(tr("Length"), self.length)
+        form.addRow(tr("Upper marker"), self.upper_end)
+        form.addRow(tr("Lower marker"), self.lower_end)
         self.column.insertLayout(0, form)
 
     def _name(self, said: Statements) -> None:
@@ -250,10 +258,10 @@ class FlashPage(MovementPage):
         self._began_ns = 0
         self._code: list[tuple[float, bool]] = []
         ids = said.rig.markers.ids
-        self.marker = _marker_box(ids, 0, "The colour of the patch: one that nothing else in the pictures has.",
+        self.marker = _marker_box(ids, 0, tr("The colour of the patch: one that nothing else in the pictures has."),
                                   self._choose)
         form = QFormLayout()
-        form.addRow("Colour of", self.marker)
+        form.addRow(tr("Colour of"), self.marker)
         self.column.insertLayout(0, form)
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
@@ -301,7 +309,7 @@ class Patch(QWidget):
         self.colour = QColor("white")
         self.lit = True
         self.setMinimumSize(240, 240)
-        self.setAccessibleName("flashing patch")
+        self.setAccessibleName(tr("flashing patch"))
 
     def show_lit(self, *, lit: bool) -> None:
         """Draw it at once, not with the next events."""
@@ -326,8 +334,8 @@ class KeepPage(AcceptPage):
 
     def __init__(self, step: KeepStep, scheme: Scheme) -> None:
         super().__init__(step, scheme, ("", "verdict", "measured"))
-        self.restore_button.setText("Delete it again")
-        self.restore_button.setToolTip("Removes the folder that was written.")
+        self.restore_button.setText(tr("Delete it again"))
+        self.restore_button.setToolTip(tr("Removes the folder that was written."))
 
 
 def _marker_box(ids: tuple[str, ...], chosen: int, meaning: str, choose: Callable[[str], None]) -> QComboBox:

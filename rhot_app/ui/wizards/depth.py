@@ -16,6 +16,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.feed import Picture, StateFeed
 from rhot_app.ui.common.record_table import Column, RecordTable
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.drawing import Callout, Dots
 from rhot_app.ui.wizards.framework.page import ChartPage, Page, shrinkable
@@ -28,14 +29,14 @@ from rhot_node.wire.messages import MarkerObservation
 def make_wizard(context: WizardContext, clock: Callable[[], float] = time.monotonic) -> Definition:
     """Measure, look at the law, use it."""
     if context.listen is None:
-        raise EngineError("this window cannot hear the markers; open the wizard from the main window.")
+        raise EngineError(tr("this window cannot hear the markers; open the wizard from the main window."))
     states, rig = StateFeed(context.listen, clock), context.rig
     distances = DistanceStep(rig, states.recent)
     law = SolveStep(context.calibration, context.now,
-                    lambda: None if distances.result is None else Done(distances.result), "Fitting the law …",
-                    "The law", f"Go back and measure at least {LEAST_ROWS} distances.")
-    law.advice = "The points should lie on the line, inside the band."
-    accept = accept_result(context, law, "Measure some distances first.")
+                    lambda: None if distances.result is None else Done(distances.result), tr("Fitting the law …"),
+                    tr("The law"), tr("Go back and measure at least {least_rows} distances.", least_rows=LEAST_ROWS))
+    law.advice = tr("The points should lie on the line, inside the band.")
+    accept = accept_result(context, law, tr("Measure some distances first."))
     return Definition((DistancePage(distances, states), ChartPage(law, context.scheme), accept), put_back=states.stop)
 
 
@@ -51,7 +52,7 @@ _STILL_PX = 1.0
 class DistanceStep(Step):
     """A marker is held at a distance that a person has measured; Space takes what the cameras see in a second."""
 
-    title = "Measure"
+    title = tr_noop("Measure")
     watches = captures = True
 
     def __init__(self, rig: Rig, recent: Callable[[float], Sequence[HandState]]) -> None:
@@ -93,11 +94,11 @@ class DistanceStep(Step):
         name = self.rig.markers.ids[self.marker]
         self.problem = ""
         if len(seen) < _LEAST_STATES:
-            self.problem = (f"The marker {name} is not seen by both cameras. Start tracking, and hold it into both "
-                            "pictures.")
+            self.problem = (tr("The marker {name} is not seen by both cameras. Start tracking, and hold it into both "
+                               "pictures.", name=name))
         elif seen.std() > _STILL_PX:
-            self.problem = (f"The marker moves ({seen.std():.1f} px). Lay it down or rest the hand, then press Space "
-                            "again.")
+            self.problem = (tr("The marker moves ({std:.1f} px). Lay it down or rest the hand, then press Space again.",
+                               std=seen.std()))
         else:
             table = DepthTable()
             row = table.add(self.distance_m, seen)
@@ -105,7 +106,7 @@ class DistanceStep(Step):
                 self.rows.append(row)
                 self._fit()
                 return True
-            self.problem = f"This cannot be measured: {table.rejected[0].reason}."
+            self.problem = tr("This cannot be measured: {reason}.", reason=table.rejected[0].reason)
         return False
 
     def remove(self, index: int) -> None:
@@ -133,8 +134,9 @@ class DistanceStep(Step):
 
     def view(self) -> StepView:
         """What to do next, and how many distances there are."""
-        bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0), f"{len(self.rows)} of {ENOUGH} or more"),
-                Bar("spread", self._spread(), "from near to far: the farthest three times the nearest"))
+        bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0),
+                    tr("{rows} of {enough} or more", rows=len(self.rows), enough=ENOUGH)),
+                Bar(tr("spread"), self._spread(), tr("from near to far: the farthest three times the nearest")))
         enough = all(bar.full for bar in bars)
         return StepView(self._sentence(), done=self.result is not None and enough,
                         hint=self.problem or ("" if self.rows else self._warning), bars=bars,
@@ -151,10 +153,11 @@ class DistanceStep(Step):
 
     def _sentence(self) -> str:
         if not self.rows:
-            return "Hold the marker straight before the cameras, enter its distance, press Space."
+            return tr("Hold the marker straight before the cameras, enter its distance, press Space.")
         if len(self.rows) < ENOUGH:
-            return "Now at another distance."
-        return "Enough. Go on, or measure more." if self._spread() >= 1.0 else "Now much nearer, or much farther away."
+            return tr("Now at another distance.")
+        return tr("Enough. Go on, or measure more.") if self._spread() >= 1.0 else tr("Now much nearer, or much "
+                                                                                      "farther away.")
 
     def _spread(self) -> float:
         distances = [row.distance_m for row in self.rows]
@@ -164,8 +167,8 @@ class DistanceStep(Step):
 # -- the page of the distances -----------------------------------------------------------------------------------------
 
 _COLUMNS: tuple[Column[DepthRow], ...] = (
-    Column("cm", lambda row: f"{100 * row.distance_m:.1f}", number=True),
-    Column("px", lambda row: f"{row.disparity_px:.2f}", number=True),
+    Column(tr_noop("cm"), lambda row: f"{100 * row.distance_m:.1f}", number=True),
+    Column(tr_noop("px"), lambda row: f"{row.disparity_px:.2f}", number=True),
     Column("± px", lambda row: f"{row.sd_px:.2f}", number=True))
 
 
@@ -179,28 +182,28 @@ class DistancePage(Page):
         self._shown: list[DepthRow] = []
         self.marker = QComboBox()
         self.marker.addItems(list(step.rig.markers.ids))
-        self.marker.setToolTip("The marker that is held at the distance.")
+        self.marker.setToolTip(tr("The marker that is held at the distance."))
         self.marker.currentIndexChanged.connect(self._choose)
         self.distance = QDoubleSpinBox()
         self.distance.setRange(5.0, 500.0)
         self.distance.setDecimals(1)
         self.distance.setSuffix(" cm")
         self.distance.setValue(100 * step.distance_m)
-        self.distance.setToolTip("From the middle between both lenses straight to the marker, by a tape measure.")
+        self.distance.setToolTip(tr("From the middle between both lenses straight to the marker, by a tape measure."))
         self.distance.valueChanged.connect(self._enter)
         self.seen = QLabel()
-        self.take_button = QPushButton("Take this distance")
+        self.take_button = QPushButton(tr("Take this distance"))
         self.take_button.setAutoDefault(False)
-        self.take_button.setToolTip("Space. Takes the disparity that both cameras have seen in the last second.")
+        self.take_button.setToolTip(tr("Space. Takes the disparity that both cameras have seen in the last second."))
         self.take_button.clicked.connect(self._take)
         form = QFormLayout()
-        form.addRow("Marker", self.marker)
-        form.addRow("Distance", self.distance)
-        form.addRow("Disparity", self.seen)
+        form.addRow(tr("Marker"), self.marker)
+        form.addRow(tr("Distance"), self.distance)
+        form.addRow(tr("Disparity"), self.seen)
         self.table = RecordTable(_COLUMNS)
-        self.table.setToolTip("Distance, mean disparity and its spread within the second.")
+        self.table.setToolTip(tr("Distance, mean disparity and its spread within the second."))
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.remove_button = QPushButton("Remove the chosen row")
+        self.remove_button = QPushButton(tr("Remove the chosen row"))
         self.remove_button.setAutoDefault(False)
         self.remove_button.clicked.connect(self._remove)
         self.table.chosen_changed.connect(self._show_removable)
@@ -210,7 +213,7 @@ class DistancePage(Page):
         shrinkable(self.table)
         self.column.addWidget(self.remove_button)
         self.first_field = self.distance
-        self.twin_facts = "Shows one marker at: choose the distance that you enter here."
+        self.twin_facts = tr("Shows one marker at: choose the distance that you enter here.")
         self._show_removable()
 
     def entered(self) -> None:
@@ -220,7 +223,8 @@ class DistancePage(Page):
     def show_view(self, view: StepView) -> None:
         """The disparity seen now, and the rows."""
         seen = self.distances.disparities()
-        self.seen.setText(f"{seen.mean():.2f} ± {seen.std():.2f} px" if len(seen) else "not seen by both cameras")
+        self.seen.setText(tr("{mean:.2f} ± {std:.2f} px", mean=seen.mean(), std=seen.std()) if len(seen)
+                          else tr("not seen by both cameras"))
         if self.distances.rows != self._shown:
             self._shown = list(self.distances.rows)
             self.table.show_records(self._shown)

@@ -21,6 +21,7 @@ from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.common.record_table import Column, RecordTable
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.movement import MovementPage, Movements, MovementStep
@@ -37,13 +38,13 @@ def make_wizard(context: WizardContext) -> Definition:
     def page(movement: Movement) -> MeterPage:
         return movements.page_of(lambda step, connect, states: MeterPage(step, connect, states, meters), movement)
 
-    still = page(Movement("Hold still", "Rest the hand before both cameras, then press Record.", STILL_S,
-                          lambda: StillGuide(meters), "Holds still."))
-    fast = page(Movement("Move fast", "Press Record, then wave the hand briskly, 20 cm wide.", FAST_S,
-                         lambda: FastGuide(meters), "Waves briskly."))
+    still = page(Movement(tr("Hold still"), tr("Rest the hand before both cameras, then press Record."), STILL_S,
+                          lambda: StillGuide(meters), tr("Holds still.")))
+    fast = page(Movement(tr("Move fast"), tr("Press Record, then wave the hand briskly, 20 cm wide."), FAST_S,
+                         lambda: FastGuide(meters), tr("Waves briskly.")))
     tune = TuneStep(context, lambda: (still.movement.log, fast.movement.log))
     return Definition((still, fast, TunePage(tune, context.scheme),
-                       accept_result(context, tune, "Record both movements first.")), put_back=movements.end)
+                       accept_result(context, tune, tr("Record both movements first."))), put_back=movements.end)
 
 
 # -- steps -------------------------------------------------------------------------------------------------------------
@@ -53,7 +54,7 @@ class TuneStep(SolveStep):
 
     def __init__(self, context: WizardContext, logs: Callable[[], tuple[Path | None, Path | None]]) -> None:
         """`logs` gives the recordings of the hand held still and moved fast."""
-        super().__init__(context.calibration, context.now, self._recorded, "Trying filters …")
+        super().__init__(context.calibration, context.now, self._recorded, tr("Trying filters …"))
         self.targets = FilterTargets()
         self.per_marker = False
         self.stage: FilterStage = "position"
@@ -170,12 +171,12 @@ class _Visibility:
     def bar(self) -> Bar:
         """How many of them."""
         return Bar("markers", float(self._seen.mean()) if len(self._seen) else 0.0,
-                   "markers that both cameras have seen so far")
+                   tr("markers that both cameras have seen so far"))
 
     def shortfall(self) -> str:
         """Those that were not seen."""
         names = [name for name, seen in zip(self._meters.names, self._seen, strict=False) if not seen]
-        return f"Both cameras have not seen {', '.join(names)}." if names else ""
+        return tr("Both cameras have not seen {names}.", names=", ".join(names)) if names else ""
 
 
 class StillGuide:
@@ -193,16 +194,16 @@ class StillGuide:
 
     def bars(self) -> tuple[Bar, ...]:
         """How much of the time the hand was at rest, and the markers in sight."""
-        return Bar("still", self._still.share, "of the time at rest that is needed"), self._visibility.bar()
+        return Bar("still", self._still.share, tr("of the time at rest that is needed")), self._visibility.bar()
 
     def sentence(self) -> str:
         """Rest it, or go on so."""
         speed = self._meters.speed_m_s
-        return "It moves: rest the hand on something." if speed > MOVING_M_S else "Good, hold still."
+        return tr("It moves: rest the hand on something.") if speed > MOVING_M_S else tr("Good, hold still.")
 
     def shortfall(self) -> str:
         """That it moved, or what was not seen."""
-        return self._visibility.shortfall() if self._still.share >= 1.0 else "The hand moved: rest it on something."
+        return self._visibility.shortfall() if self._still.share >= 1.0 else tr("The hand moved: rest it on something.")
 
 
 class FastGuide:
@@ -225,16 +226,17 @@ class FastGuide:
 
     def bars(self) -> tuple[Bar, ...]:
         """The speed, how much of the time it was enough, and the markers in sight."""
-        return (Bar("speed", self._share, f"of {BRISK_M_S:.1f} m/s, the fastest marker of the last two seconds"),
-                Bar("fast", self._fast.share, "of the time at that speed that is needed"), self._visibility.bar())
+        return (Bar("speed", self._share,
+                    tr("of {brisk_m_s:.1f} m/s, the fastest marker of the last two seconds", brisk_m_s=BRISK_M_S)),
+                Bar("fast", self._fast.share, tr("of the time at that speed that is needed")), self._visibility.bar())
 
     def sentence(self) -> str:
         """Faster, or go on so."""
-        return "Good, go on." if self._share >= 1.0 else "Faster, 20 cm wide."
+        return tr("Good, go on.") if self._share >= 1.0 else tr("Faster, 20 cm wide.")
 
     def shortfall(self) -> str:
         """That it was slow, or what was not seen."""
-        return self._visibility.shortfall() if self._fast.share >= 1.0 else "The hand was too slow."
+        return self._visibility.shortfall() if self._fast.share >= 1.0 else tr("The hand was too slow.")
 
 
 def _text(value: float, decimals: int) -> str:
@@ -245,7 +247,7 @@ def _text(value: float, decimals: int) -> str:
 
 _HEADS = ("", "raw", "filtered", "lag")
 _ROW_PX = 26
-_STAGES = (("position", "after depth (positions)"), ("pixel", "before depth (pixels)"))
+_STAGES = (("position", tr_noop("after depth (positions)")), ("pixel", tr_noop("before depth (pixels)")))
 
 
 class MeterPage(MovementPage):
@@ -260,9 +262,9 @@ class MeterPage(MovementPage):
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.setShowGrid(False)
-        self.table.setToolTip("Of the last two seconds: jitter without filters and, at rest, with those in force, mm "
-                              "rms; and how far the filters lag behind, ms, while a marker moves.")
-        caption = QLabel("Jitter, mm, and lag, ms, of now")
+        self.table.setToolTip(tr("Of the last two seconds: jitter without filters and, at rest, with those in force, "
+                                 "mm rms; and how far the filters lag behind, ms, while a marker moves."))
+        caption = QLabel(tr("Jitter, mm, and lag, ms, of now"))
         caption.setProperty("muted", True)
         self.column.insertWidget(self.column.count() - 1, caption)
         self.column.insertWidget(self.column.count() - 1, self.table, 4)
@@ -281,20 +283,20 @@ class TunePage(ChartPage):
     def __init__(self, step: TuneStep, scheme: Scheme) -> None:
         super().__init__(step, scheme)
         self._tune = step
-        self.jitter = _box(1e3 * step.targets.jitter_m, 0.05, " mm", "How much a marker may jitter at rest, rms.")
-        self.lag = _box(1e3 * step.targets.lag_s, 0.1, " ms", "How far a fast marker may lag behind.")
+        self.jitter = _box(1e3 * step.targets.jitter_m, 0.05, " mm", tr("How much a marker may jitter at rest, rms."))
+        self.lag = _box(1e3 * step.targets.lag_s, 0.1, " ms", tr("How far a fast marker may lag behind."))
         self.stage = QComboBox()
         for value, text in _STAGES:
-            self.stage.addItem(text, value)
-        self.stage.setToolTip("There are two filters: one smooths the pixels before distances are computed, the other "
-                              "the positions after it.")
-        self.own = QCheckBox("each marker its own settings")
-        self.own.setToolTip("Otherwise all markers get the settings that serve the worst of them.")
+            self.stage.addItem(tr(text), value)
+        self.stage.setToolTip(tr("There are two filters: one smooths the pixels before distances are computed, the "
+                                 "other the positions after it."))
+        self.own = QCheckBox(tr("each marker its own settings"))
+        self.own.setToolTip(tr("Otherwise all markers get the settings that serve the worst of them."))
         form = QFormLayout()
         form.setSpacing(8)
-        form.addRow("Jitter", self.jitter)
-        form.addRow("Lag", self.lag)
-        form.addRow("Charts", self.stage)
+        form.addRow(tr("Jitter"), self.jitter)
+        form.addRow(tr("Lag"), self.lag)
+        form.addRow(tr("Charts"), self.stage)
         form.addRow(self.own)
         self.column.insertLayout(0, form)
         self.jitter.valueChanged.connect(self._allow)

@@ -22,6 +22,7 @@ from rhot_app.errors import EngineError, RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import Picture, ask_picture
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
 from rhot_app.ui.wizards.framework.drawing import Layer
 from rhot_app.ui.wizards.framework.page import Page
@@ -35,8 +36,8 @@ def make_wizard(context: WizardContext) -> Definition:
     """The wizard's pages for the rig at hand."""
     cameras = {node.name: node.node_id for node in context.rig.nodes if node.node_id in context.now.node_settings}
     empty, skin = EmptyStep(cameras), SkinStep(cameras, context.connect)
-    last = accept_page(context, lambda: propose(empty, skin), "Learn the empty scene and your hand first.")
-    pages = (LearnPage(empty, context, "Learn the empty scene"), LearnPage(skin, context, "Learn my skin"),
+    last = accept_page(context, lambda: propose(empty, skin), tr("Learn the empty scene and your hand first."))
+    pages = (LearnPage(empty, context, tr("Learn the empty scene")), LearnPage(skin, context, tr("Learn my skin")),
              last)
 
     def put_back() -> None:
@@ -61,7 +62,7 @@ class LearnPage(Page):
         self._job: Job | None = None
         self.learn_button = QPushButton(label)
         self.learn_button.setAutoDefault(False)
-        self.learn_button.setToolTip("Tried out at once by every node, and kept by none before the last step.")
+        self.learn_button.setToolTip(tr("Tried out at once by every node, and kept by none before the last step."))
         self.learn_button.clicked.connect(self.learn)
         self.column.addWidget(self.learn_button)
         self.column.addStretch(1)
@@ -119,8 +120,8 @@ def foreground_of(command: Command, node_id: int) -> dict[str, Any]:
     """What a node knows of background and skin. Raises EngineError, also for a node that knows no such thing."""
     known = ask_node(command, node_id, "state").get("answer", {}).get("foreground")
     if not isinstance(known, dict):
-        raise EngineError("a node learns neither background nor skin. Does rhot-node have the version of this program "
-                          "there?")
+        raise EngineError(tr("a node learns neither background nor skin. Does rhot-node have the version of this "
+                             "program there?"))
     return known
 
 
@@ -187,19 +188,22 @@ class SceneWatch:
         sd = self._sums.learnt(no_foreground()).sd.max(axis=2)
         moving = float(np.mean(sd > _MOVES * np.median(sd)))
         if moving >= LEAST:
-            return [Finding("moves", Grade.POOR, f"{camera}: something moved in {moving:.1%} of the picture.",
-                            "What moves is no background.", "Keep out of the picture and learn it again.")]
+            return [Finding("moves", Grade.POOR, tr("{camera}: something moved in {moving:.1%} of the picture.",
+                                                    camera=camera, moving=moving), tr("What moves is no background."),
+                            tr("Keep out of the picture and learn it again."))]
         if self._skin > 0.0:
-            return [Finding("skin", Grade.FAIR, f"{camera}: something in {self._skin:.1%} of the picture has the "
-                            "colours of skin.", "A hand that is learnt as background is not found there.",
-                            "If it is a hand or a face, take it away and learn again; if it is wood or cloth, go on.")]
+            return [Finding("skin", Grade.FAIR, tr("{camera}: something in {skin:.1%} of the picture has the colours "
+                                                   "of skin.", camera=camera, skin=self._skin),
+                            tr("A hand that is learnt as background is not found there."),
+                            tr("If it is a hand or a face, take it away and learn again; if it is wood or cloth, go "
+                               "on."))]
         return []
 
 
 class EmptyStep(LearningStep):
     """The scene without a hand."""
 
-    title = "Empty scene"
+    title = tr_noop("Empty scene")
 
     def __init__(self, cameras: Mapping[str, int]) -> None:
         super().__init__(cameras)
@@ -230,12 +234,12 @@ class EmptyStep(LearningStep):
             if not waiting:
                 break
             if time.monotonic() > self._until_s + _WAIT_S:
-                raise EngineError(f"{' and '.join(waiting)}: the background was not learnt in time. Look at the Nodes "
-                                  "panel, then learn it again.")
+                raise EngineError(tr("{names}: the background was not learnt in time. Look at the Nodes panel, then "
+                                     "learn it again.", names=" and ".join(waiting)))
             time.sleep(_LOOK_S)
         if all(watch.seen for watch in watches.values()):
-            self.verdict = judge("the scene is learnt.", [finding for name, watch in watches.items()
-                                                          for finding in watch.findings(name)])
+            self.verdict = judge(tr("the scene is learnt."),
+                                 [finding for name, watch in watches.items() for finding in watch.findings(name)])
         return ""
 
     def _has_learnt(self, command: Command, node_id: int) -> bool:
@@ -249,19 +253,20 @@ class EmptyStep(LearningStep):
     def view(self) -> StepView:
         """What to do."""
         if not self.nodes:
-            return StepView("No camera answers.", hint="Look at the Nodes panel: its sentence says what is wrong.")
+            return StepView(tr("No camera answers."),
+                            hint=tr("Look at the Nodes panel: its sentence says what is wrong."))
         done = 1.0 if self.learnt else 0.0
         if self.learning:
             done = min(max(1.0 - (self._until_s - time.monotonic()) / SECONDS, 0.0), 1.0)
         verdict = self.verdict if self.learnt and not self.learning else None
-        sentence = ("Keep out of the pictures." if self.learning else
-                    "Learnt. Go on, or learn it again after anything in the pictures has changed."
-                    if verdict is not None and verdict.grade is Grade.GOOD else
-                    "Is the scene empty? Read what was seen, and learn it again." if verdict is not None else
-                    "Take the hand out of both pictures and leave everything as it will be. Then press Learn.")
+        sentence = (tr("Keep out of the pictures.") if self.learning
+                    else tr("Learnt. Go on, or learn it again after anything in the pictures has changed.")
+                    if verdict is not None and verdict.grade is Grade.GOOD
+                    else tr("Is the scene empty? Read what was seen, and learn it again.") if verdict is not None
+                    else tr("Take the hand out of both pictures and leave everything as it will be. Then press Learn."))
         return StepView(sentence, done=verdict is not None and verdict.grade is Grade.GOOD, hint=self.problem,
-                        bars=(Bar("empty scene", done, f"{SECONDS:g} s of every camera"),), verdict=verdict,
-                        passable=verdict is not None and verdict.acceptable)
+                        bars=(Bar(tr("empty scene"), done, tr("{seconds:g} s of every camera", seconds=SECONDS)),),
+                        verdict=verdict, passable=verdict is not None and verdict.acceptable)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -277,7 +282,7 @@ class Mask:
 class SkinStep(LearningStep):
     """The hand before the learnt background, its foreground live."""
 
-    title = "Your hand"
+    title = tr_noop("Your hand")
     watches = True
 
     def __init__(self, cameras: Mapping[str, int], connect: Callable[[], Asker]) -> None:
@@ -289,8 +294,8 @@ class SkinStep(LearningStep):
         """The next picture's skin of each camera."""
         without = [name for name, node_id in self.nodes.items() if not self._finds_skin(command, node_id)]
         return "" if not without else (
-            f"No skin was found in the picture of {' and '.join(without)}, so the colours of any skin are used there. "
-            "Hold the hand into both pictures and learn it again.")
+            tr("No skin was found in the picture of {names}, so the colours of any skin are used there. Hold the hand "
+               "into both pictures and learn it again.", names=" and ".join(without)))
 
     def _finds_skin(self, command: Command, node_id: int) -> bool:
         with self._asking:
@@ -318,17 +323,17 @@ class SkinStep(LearningStep):
         if not self.masks or set(self.masks) != set(self.nodes):
             return None
         findings = [finding for name, mask in self.masks.items() for finding in findings_of(name, mask)]
-        return judge("; ".join(f"{name}: {mask.covered:.1%} of the picture is the hand"
+        return judge("; ".join(tr("{name}: {covered:.1%} of the picture is the hand", name=name, covered=mask.covered)
                                for name, mask in self.masks.items()) + ".", findings)
 
     def view(self) -> StepView:
         """The masks and what they say."""
         verdict = self.verdict
         good = verdict is not None and verdict.acceptable
-        sentence = ("One moment." if self.learning else
-                    "Hold your bare hand into both pictures, fingers spread, and press Learn." if not self.learnt else
-                    "The hand and little else should be tinted: then press Next." if good else
-                    "Read what is wrong, then learn it again.")
+        sentence = (tr("One moment.") if self.learning
+                    else tr("Hold your bare hand into both pictures, fingers spread, and press Learn.")
+                    if not self.learnt else tr("The hand and little else should be tinted: then press Next.") if good
+                    else tr("Read what is wrong, then learn it again."))
         return StepView(sentence, done=self.learnt and good and not self.learning, hint=self.problem, verdict=verdict,
                         annotated={name: mask.annotated for name, mask in self.masks.items()
                                    if mask.annotated is not None})
@@ -342,7 +347,7 @@ def mask_of(camera: str, told: Mapping[str, Any]) -> Mask:
         grey = decode_picture(data[:mask_bytes], grey=True)
         bgr = decode_picture(data[mask_bytes:]) if mask_bytes else None
     except PictureError as exc:
-        raise EngineError("a node gave a foreground that cannot be read; restart it.") from exc
+        raise EngineError(tr("a node gave a foreground that cannot be read; restart it.")) from exc
     hand: NDArray[np.uint8] = np.asarray(grey > 127, np.uint8)
     count, _, stats, _ = cv2.connectedComponentsWithStats(hand, connectivity=8)
     total = int(hand.sum())
@@ -359,19 +364,24 @@ def mask_of(camera: str, told: Mapping[str, Any]) -> Mask:
 def findings_of(camera: str, mask: Mask) -> list[Finding]:
     """What is wrong with one camera's foreground."""
     if mask.covered < LEAST:
-        return [Finding("nothing", Grade.POOR, f"{camera}: the hand covers "
-                        f"{told_apart(100.0 * mask.covered, 100.0 * LEAST, 1)} % of the picture, less than "
-                        f"{100.0 * LEAST:g} %.",
-                        "It was in the picture while the empty scene was learnt, or is not there now.",
-                        "Hold it into the picture; if it is there, go back and learn the empty scene without it.")]
+        return [Finding("nothing", Grade.POOR, tr("{camera}: the hand covers {told_apart} % of the picture, less than "
+                                                  "{least:g} %.", camera=camera,
+                                                  told_apart=told_apart(100.0 * mask.covered, 100.0 * LEAST, 1),
+                                                  least=100.0 * LEAST),
+                        tr("It was in the picture while the empty scene was learnt, or is not there now."),
+                        tr("Hold it into the picture; if it is there, go back and learn the empty scene without it."))]
     if mask.covered > MOST:
-        return [Finding("everything", Grade.POOR, f"{camera}: {told_apart(100.0 * mask.covered, 100.0 * MOST)} % "
-                        f"of the picture differs from the empty scene, more than {100.0 * MOST:g} %.",
-                        "Light, exposure or the camera have changed since.",
-                        "Go back and learn the empty scene again.")]
+        return [Finding("everything", Grade.POOR, tr("{camera}: {told_apart} % of the picture differs from the empty "
+                                                     "scene, more than {most:g} %.", camera=camera,
+                                                     told_apart=told_apart(100.0 * mask.covered, 100.0 * MOST),
+                                                     most=100.0 * MOST),
+                        tr("Light, exposure or the camera have changed since."),
+                        tr("Go back and learn the empty scene again."))]
     if mask.whole < WHOLE:
-        return [Finding("pieces", Grade.FAIR, f"{camera}: {1.0 - mask.whole:.0%} of what is tinted is not the hand.",
-                        "Shadows, a second hand, a face or moving things.", "Take them away, or have more even light.")]
+        return [Finding("pieces", Grade.FAIR, tr("{camera}: {whole:.0%} of what is tinted is not the hand.",
+                                                 camera=camera, whole=1.0 - mask.whole),
+                        tr("Shadows, a second hand, a face or moving things."),
+                        tr("Take them away, or have more even light."))]
     return []
 
 
@@ -404,7 +414,7 @@ class ForegroundChange:
     @property
     def way_back(self) -> str:
         """The nodes' own: one earlier state."""
-        return "Each node keeps what it had, and Restore the old one brings it back here, until this window closes."
+        return tr("Each node keeps what it had, and Restore the old one brings it back here, until this window closes.")
 
     def restore(self, command: Command) -> None:
         """What was kept before. A node that does not answer keeps none of the others from it."""
@@ -421,7 +431,7 @@ class ForegroundChange:
                     ask_node(command, self.nodes[name], "revert_foreground", earlier=True)
                     self._kept[name] = False
             except RhotError as exc:
-                problems.append(f"{name} still has what was learnt now: {exc}")
+                problems.append(tr("{name} still has what was learnt now: {exc}", name=name, exc=exc))
         return " ".join(problems)
 
 
@@ -431,13 +441,14 @@ def propose(empty: EmptyStep, skin: SkinStep) -> Proposal | None:
     if not (empty.learnt and skin.learnt) or verdict is None or empty.verdict is None:
         return None
     verdict = with_findings(verdict, empty.verdict.findings)
-    rows = [row for name in empty.nodes for row in (
-        Row(f"{name}: background", _background(empty.before.get(name, {})), "learnt now"),
-        Row(f"{name}: skin", str(empty.before.get(name, {}).get("skin", "none")), "learnt now"))]
+    rows = [row for name in empty.nodes
+            for row in (
+        Row(tr("{name}: background", name=name), _background(empty.before.get(name, {})), tr("learnt now")),
+        Row(tr("{name}: skin", name=name), str(empty.before.get(name, {}).get("skin", "none")), tr("learnt now")))]
     return Proposal(FOREGROUND.reason, verdict, tuple(rows),
                     changes=(ForegroundChange(empty.nodes, empty.tried + skin.tried),),
-                    afterwards="Calibrate, Tracker chooses the bare hand.")
+                    afterwards=tr("Calibrate, Tracker chooses the bare hand."))
 
 
 def _background(known: dict[str, Any]) -> str:
-    return "learnt earlier" if known.get("background") else "none"
+    return tr("learnt earlier") if known.get("background") else "none"

@@ -9,21 +9,22 @@ from rhot_app.calibration.stereo.calibrate import KnownLengths
 from rhot_app.calibration.stereo.ruler import RulerReading
 from rhot_app.simulator.scene.scene_description import RulerShow
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.drawing import Dots, Line, Overlay
 from rhot_app.ui.wizards.framework.page import Page
 from rhot_app.ui.wizards.framework.step import Pictures, Step, StepView
 
 ENDS = 2
-NEEDED = ("The scale comes from the board's squares alone; a second length finds a wrong number. Next waits for one, "
-          "or for Skip below.")
-SKIPPED = "The rig file will say that no length was checked, and so will the app."
+NEEDED = (tr_noop("The scale comes from the board's squares alone; a second length finds a wrong number. Next waits "
+                  "for one, or for Skip below."))
+SKIPPED = tr_noop("The rig file will say that no length was checked, and so will the app.")
 
 
 class LengthsStep(Step):
     """One of them is needed, or a person who knows what it means to skip it. The ruler's ends are clicked in pictures
     that stand still; lengths in mm, 0 for none."""
 
-    title = "A known length"
+    title = tr_noop("A known length")
     watches = captures = True
 
     def __init__(self, cameras: tuple[str, ...]) -> None:
@@ -106,18 +107,18 @@ class LengthsStep(Step):
         """What to do for the ruler, if there is one."""
         overlays = {name: self._overlay(name) for name in self.cameras or ()}
         known = self._known.ruler is not None or self._known.baseline_m is not None
-        hint = "" if known else SKIPPED if self.skipped else NEEDED
+        hint = "" if known else tr(SKIPPED) if self.skipped else tr(NEEDED)
         return StepView(self._sentence(known), done=known, hint=hint, overlays=overlays, pictures=self.frozen,
                         passable=self.skipped and not self.frozen, kept=int(bool(self.frozen)))
 
     def _sentence(self, known: bool) -> str:
         if self.frozen and self._known.ruler is None:
-            return "Click both ends of the ruler in each picture, in the same order."
+            return tr("Click both ends of the ruler in each picture, in the same order.")
         if self._ruler_mm > 0.0 and self._known.ruler is None:
-            return "Hold the ruler where both cameras see it, and press Space."
+            return tr("Hold the ruler where both cameras see it, and press Space.")
         if known:
-            return "The scale will be checked: press Next."
-        return "Lengths stay unproven: press Next." if self.skipped else "Measure a second length."
+            return tr("The scale will be checked: press Next.")
+        return tr("Lengths stay unproven: press Next.") if self.skipped else tr("Measure a second length.")
 
     def _overlay(self, name: str) -> Overlay:
         ends = np.array(self._ends(name)).reshape(-1, 2)
@@ -128,7 +129,7 @@ class LengthsStep(Step):
 
 # -- its page: two fields, and clicks on the ruler's ends --------------------------------------------------------------
 
-SKIP = "Skip: lengths stay unproven"
+SKIP = tr_noop("Skip: lengths stay unproven")
 
 
 class LengthsPage(Page):
@@ -138,22 +139,23 @@ class LengthsPage(Page):
         super().__init__(step)
         self._known = step
         self.pickable = True
-        self.twin_facts = f"Shows a ruler: its crosses are {RulerShow().length_mm:g} mm apart."
-        self.baseline = _length("The distance between the middles of the two lenses, measured by hand. 75 mm on the "
-                                "frame that the thesis describes.")
-        self.ruler = _length("The distance between two marks on a ruler, 200 mm for instance, that both cameras see.")
+        self.twin_facts = tr("Shows a ruler: its crosses are {length_mm:g} mm apart.", length_mm=RulerShow().length_mm)
+        self.baseline = _length(tr("The distance between the middles of the two lenses, measured by hand. 75 mm on the "
+                                   "frame that the thesis describes."))
+        self.ruler = _length(tr("The distance between two marks on a ruler, 200 mm for instance, that both cameras "
+                                "see."))
         form = QFormLayout()
         form.setSpacing(8)
-        form.addRow("Lens to lens", self.baseline)
-        form.addRow("Ruler", self.ruler)
-        self.hold = QPushButton("Hold the pictures")
-        self.hold.setToolTip("Space. Then click both ends of the ruler in each picture.")
+        form.addRow(tr("Lens to lens"), self.baseline)
+        form.addRow(tr("Ruler"), self.ruler)
+        self.hold = QPushButton(tr("Hold the pictures"))
+        self.hold.setToolTip(tr("Space. Then click both ends of the ruler in each picture."))
         self.hold.setAutoDefault(False)
         self.hold.clicked.connect(self._hold)
         self.column.addLayout(form)
-        self.skip = QPushButton(SKIP)
-        self.skip.setToolTip("If the size of the squares was typed wrong, every length is wrong by the same factor "
-                             "and nothing will tell.")
+        self.skip = QPushButton(tr(SKIP))
+        self.skip.setToolTip(tr("If the size of the squares was typed wrong, every length is wrong by the same factor "
+                                "and nothing will tell."))
         self.skip.setAutoDefault(False)
         self.skip.clicked.connect(self._skip)
         self.column.addWidget(self.hold)
@@ -181,9 +183,9 @@ class LengthsPage(Page):
     def show_view(self, view: StepView) -> None:
         """The button says what it would do; there is nothing to skip once a length is known."""
         self.skip.setEnabled(not view.done)
-        self.skip.setText("Do not skip" if self._known.skipped and not view.done else SKIP)
+        self.skip.setText(tr("Do not skip") if self._known.skipped and not view.done else tr(SKIP))
         self.hold.setEnabled(self.ruler.value() > 0.0)
-        self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
+        self.hold.setText(tr("Let the pictures go on") if view.pictures else tr("Hold the pictures"))
 
 
 def _length(meaning: str) -> QDoubleSpinBox:
@@ -191,6 +193,6 @@ def _length(meaning: str) -> QDoubleSpinBox:
     box.setRange(0.0, 5000.0)
     box.setDecimals(1)
     box.setSuffix(" mm")
-    box.setSpecialValueText("not measured")
+    box.setSpecialValueText(tr("not measured"))
     box.setToolTip(meaning)
     return box

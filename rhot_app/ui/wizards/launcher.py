@@ -24,6 +24,7 @@ from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.shapes import shape_icon
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext
 from rhot_app.ui.wizards.framework.window import WizardWindow
@@ -75,7 +76,7 @@ class Launcher(QObject):
         if not path:
             for action, wizard in zip(actions, calibrations(), strict=True):
                 action.setIcon(QIcon())
-                action.setText(f"{wizard.title} …")
+                action.setText(f"{tr(wizard.title)} …")
             return
         when = self.in_force(path)
         scheme = self._scheme()
@@ -83,7 +84,8 @@ class Launcher(QObject):
             done = max((at for reason, at in when.items() if reason.startswith(wizard.reason)), default=None)
             shape, tone = ("tick", scheme.good) if done is not None else ("ring", scheme.neutral)
             action.setIcon(shape_icon(shape, tone))
-            action.setText(f"{wizard.title} …\t{age_text(done) if done is not None else 'not yet'}")
+            age = tr("not yet") if done is None else age_text(done)
+            action.setText(f"{tr(wizard.title)} …\t{age}")
 
     def in_force(self, path: str) -> dict[str, datetime]:
         """When each thing of the rig at `path` was made that is in force, by its reason."""
@@ -154,7 +156,7 @@ class Launcher(QObject):
     def _show_versions(self, now: InForce) -> None:
         self._job = None
         if now.path is None:
-            self.failed.emit("This rig came from no file, so there are no earlier versions of it. Save it first.")
+            self.failed.emit(tr("This rig came from no file, so there are no earlier versions of it. Save it first."))
             return
         self.versions = VersionsDialog(now.path, now.rig, self._connect, self._scheme(), self._window)
         self.versions.rig_used.connect(lambda rig: self.rig_used.emit())
@@ -211,9 +213,9 @@ def age_text(when: datetime, now: datetime | None = None) -> str:
     """How long ago in words: "today", "yesterday", "5 days ago", "3 months ago"."""
     days = ((now or datetime.now(UTC)).astimezone().date() - when.astimezone().date()) // timedelta(days=1)
     if days <= 0:
-        return "today"
+        return tr("today")
     if days == 1:
-        return "yesterday"
+        return tr("yesterday")
     if days < 60:
-        return f"{days} days ago"
-    return f"{days // 30} months ago"
+        return tr("{n} day ago", "{n} days ago", days)
+    return tr("{n} month ago", "{n} months ago", days // 30)

@@ -15,6 +15,7 @@ from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
 from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
 from rhot_app.project import Intrinsics
 from rhot_app.ui.backend.feed import Image, Picture
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.board import (
     MEMORY,
     BoardFields,
@@ -59,15 +60,16 @@ def _next(cameras: tuple[str, ...], done: str) -> str:
 FEWEST = 5  # views that a solve can do anything with
 _VOUCHED_S = 0.03  # a person who presses Space says that the board has not moved since the last picture
 _CELL_FULL = 12  # corners in a part of the picture that tint it wholly
-_BARS = {"x": ("X", "from the left to the right edge"), "y": ("Y", "from the upper to the lower edge"),
-         "size": ("size", "near enough to fill much of the picture"),
-         "skew": ("skew", "tilted, which tells the focal length")}
+_BARS = {"x": ("X", tr_noop("from the left to the right edge")),
+         "y": ("Y", tr_noop("from the upper to the lower edge")),
+         "size": ("size", tr_noop("near enough to fill much of the picture")),
+         "skew": ("skew", tr_noop("tilted, which tells the focal length"))}
 
 
 class LensBoardStep(BoardStep):
     """Which camera, and which board."""
 
-    title = "Camera and board"
+    title = tr_noop("Camera and board")
 
     def __init__(self, fields: BoardFields, cameras: tuple[str, ...], first: str) -> None:
         """`first` is chosen to begin with, if there is such a camera."""
@@ -84,7 +86,7 @@ class LensBoardStep(BoardStep):
 class LensShowStep(FilmedStep):
     """Views of the board, taken by themselves when it is still, sharp and somewhere new, or with Space."""
 
-    title = "Show the board"
+    title = tr_noop("Show the board")
     watches = captures = True
 
     def __init__(self, board_step: LensBoardStep) -> None:
@@ -100,7 +102,7 @@ class LensShowStep(FilmedStep):
     def enter(self) -> None:
         """Another board or camera makes the views useless; a corrected size of the squares does not."""
         board, camera = self._board_step.board, self._board_step.camera
-        assert board is not None, "the first step is not done without a board"
+        assert board is not None, tr("the first step is not done without a board")
         self.cameras = (camera,)
         if self._of is None or self._guide is None or self._of[0] != camera or not same_pattern(self._of[1], board):
             if self.films.cameras != (camera,):
@@ -113,7 +115,7 @@ class LensShowStep(FilmedStep):
     def begin(self) -> None:
         """Forget what was taken."""
         board, camera = self._board_step.board, self._board_step.camera
-        assert board is not None, "the first step is not done without a board"
+        assert board is not None, tr("the first step is not done without a board")
         self._of, self._guide = (camera, board), CaptureGuide(board)
         self._seen, self._sentence, self._covered = (None, 0.0), "", None
         super().begin()
@@ -185,17 +187,19 @@ class LensShowStep(FilmedStep):
     def shown(self) -> StepView:
         """What to do with the board, and what is covered."""
         if self._guide is None:
-            return StepView("Show the whole board to the camera.")
+            return StepView(tr("Show the whole board to the camera."))
         count = len(self.views)
         if self._covered is None or count != self._covered[0]:
             self._covered = count, self._guide.coverage, self._guide.complete
         _, coverage, complete = self._covered
         bars = [Bar(_BARS[key][0], share, _BARS[key][1]) for key, share in coverage.bars.items()]
-        bars.append(Bar("picture", min(coverage.share / 0.7, 1.0), "parts of the picture in which corners were seen"))
+        bars.append(Bar("picture", min(coverage.share / 0.7, 1.0),
+                        tr("parts of the picture in which corners were seen")))
         overlay: Overlay = (Cells(coverage.cells / _CELL_FULL),)
         annotated = self.search.annotated(self.board)
-        sentence = "Enough: press Next." if complete else self._sentence or "Show the whole board to the camera."
-        taken = f"{count} pictures taken." if count else ""
+        sentence = tr("Enough: press Next.") if complete else self._sentence or tr("Show the whole board to the "
+                                                                                   "camera.")
+        taken = tr("{count} pictures taken.", count=count) if count else ""
         return StepView(sentence, done=complete, hint=self.search.missing or taken, bars=tuple(bars),
                         annotated=annotated, overlays={self.camera: overlay}, kept=count, passable=count >= FEWEST)
 
@@ -212,7 +216,8 @@ class LensSolveStep(SolveStep):
 
     def __init__(self, context: WizardContext, show: LensShowStep) -> None:
         super().__init__(context.calibration, context.now,
-                         lambda: (show.views, show.board, show.camera, self.square_pixels), "Estimating the intrinsics")
+                         lambda: (show.views, show.board, show.camera, self.square_pixels),
+                         tr("Estimating the intrinsics"))
         self._show = show
         self._straight: dict[str, Picture] = {}
         self.straighten = False
@@ -270,7 +275,7 @@ def residual_marks(result: IntrinsicsReport) -> Overlay:
                 start = np.array([(col + 0.5) * width / cols, (row + 0.5) * height / rows])
                 marks += [Line(np.array([start, start + times * mean]), "caution", width=2.5),
                           Dots(start[None], "caution", radius=2.5, filled=True)]
-    return (*marks, Tag(6.0, height - 24.0, f"arrows: residuals × {times:,.0f}"))
+    return (*marks, Tag(6.0, height - 24.0, tr("arrows: residuals × {times:,.0f}", times=times)))
 
 
 # -- the pages of the lens wizard --------------------------------------------------------------------------------------
@@ -283,8 +288,8 @@ class LensBoardPage(BoardPage):
         self.which = QComboBox()
         self.which.addItems(step.choices)
         self.which.setCurrentText(step.camera)
-        self.which.setToolTip("Whose intrinsics are calibrated. One camera at a time.")
-        self.add_field("Camera", self.which)
+        self.which.setToolTip(tr("Whose intrinsics are calibrated. One camera at a time."))
+        self.add_field(tr("Camera"), self.which)
         self.which.currentTextChanged.connect(self._choose)
         self.first_field = self.which
         self._lens_step = step
@@ -300,17 +305,17 @@ class LensResultPage(Page):
     def __init__(self, step: LensSolveStep) -> None:
         super().__init__(step)
         self._lens = step
-        self.straighten = QCheckBox("Straighten the picture")
-        self.straighten.setToolTip("Shows the live picture without the lens's distortion: hold a ruler before the "
-                                   "camera, it must be straight everywhere.")
+        self.straighten = QCheckBox(tr("Straighten the picture"))
+        self.straighten.setToolTip(tr("Shows the live picture without the lens's distortion: hold a ruler before the "
+                                      "camera, it must be straight everywhere."))
         self.straighten.toggled.connect(self._straighten)
-        self.square = QCheckBox("Pixels are square")
-        self.square.setToolTip("Forces one focal length for both directions, as nearly every sensor has it. Fewer "
-                               "numbers to find need fewer views.")
+        self.square = QCheckBox(tr("Pixels are square"))
+        self.square.setToolTip(tr("Forces one focal length for both directions, as nearly every sensor has it. Fewer "
+                                  "numbers to find need fewer views."))
         self.square.toggled.connect(self._square)
         self.table = FigureTable(3)
-        self.table.setToolTip("How well each view fits. Arrows in the picture are the mean residual of each part: "
-                              "a pattern in them is something that the lens model does not explain.")
+        self.table.setToolTip(tr("How well each view fits. Arrows in the picture are the mean residual of each part: a "
+                                 "pattern in them is something that the lens model does not explain."))
         self.column.addWidget(self.straighten)
         self.column.addWidget(self.square)
         self.column.addWidget(self.table, 1)

@@ -16,6 +16,7 @@ from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollect
 from rhot_app.calibration.stereo.report import StereoReport
 from rhot_app.calibration.stereo.start import WorldFrame, place_world
 from rhot_app.errors import CalibrationError
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.board import (
     MEMORY,
     BoardObservation,
@@ -41,7 +42,7 @@ def make_wizard(context: WizardContext) -> Definition:
     show = ShowStep(board, cameras)
     known = LengthsStep(cameras)
     solve = SolveStep(context.calibration, context.now, lambda: (StereoViews(show.views, known.known, lenses),),
-                      "Calibrating the cameras")
+                      tr("Calibrating the cameras"))
     table = TableStep(board, solve, cameras)
     accept = accept_result(context, solve, completed=lambda result: replace(result, table=table.world))
     pages = (BoardPage(board, context.memory), FilmsPage(show), LengthsPage(known), Page(solve), Page(table), accept)
@@ -69,7 +70,7 @@ class BoardFinder(Step):
     def board(self) -> Board:
         """The board that the person holds."""
         board = self._board_step.board
-        assert board is not None, "the first step is not done without a board"
+        assert board is not None, tr("the first step is not done without a board")
         return board
 
     def observe(self, pictures: Pictures) -> BoardObservation:
@@ -86,7 +87,7 @@ class BoardFinder(Step):
 class ShowStep(BoardFinder, FilmedStep):
     """Shared captures: kept by themselves when the board is still and somewhere new, or with Space."""
 
-    title = "Show the board"
+    title = tr_noop("Show the board")
     captures = True
 
     def __init__(self, board_step: BoardStep, cameras: tuple[str, ...]) -> None:
@@ -154,19 +155,21 @@ class ShowStep(BoardFinder, FilmedStep):
     def shown(self) -> StepView:
         """What to do with the board, and how far it is."""
         if self._collector is None:
-            return StepView("Show the board to both cameras.")
+            return StepView(tr("Show the board to both cameras."))
         shots = self.views.shots
         if self._guidance is None or len(shots) != self._guided:
             self._guidance, self._guided = self._collector.guidance(), len(shots)
         guidance = self._guidance
         bars = [Bar(f"{pair.first} + {pair.second}", pair.shared / (pair.shared + pair.missing),
-                    "shots that both cameras share") for pair in guidance.pairs]
+                    tr("shots that both cameras share")) for pair in guidance.pairs]
         if not guidance.pairs:
-            bars.append(Bar(f"{len(shots)} shots", 1.0, "every camera shares enough shots with another"))
-        bars += [Bar(f"{name} covered", share, "part of the picture where the board was") for name, share
-                 in zip(self.cameras or (), guidance.covered, strict=True)]
-        bars += [Bar("tilted", float(guidance.tilted), "the board was seen tilted: this tells the focal length"),
-                 Bar("near and far", float(guidance.near_and_far), "the board was seen large and small")]
+            bars.append(Bar(tr("{shots} shots", shots=len(shots)), 1.0,
+                            tr("every camera shares enough shots with another")))
+        bars += [Bar(tr("{name} covered", name=name), share, tr("part of the picture where the board was")) for name,
+                 share in zip(self.cameras or (), guidance.covered, strict=True)]
+        bars += [Bar(tr("tilted"), float(guidance.tilted),
+                     tr("the board was seen tilted: this tells the focal length")),
+                 Bar(tr("near and far"), float(guidance.near_and_far), tr("the board was seen large and small"))]
         hint = self.search.missing or self._offer.why.removesuffix(guidance.advice).strip()
         return StepView(self._sentence(guidance.advice), done=guidance.complete, hint=hint,
                         bars=tuple(bars), annotated=self._annotated(), overlays=self._overlays(shots),
@@ -174,9 +177,9 @@ class ShowStep(BoardFinder, FilmedStep):
 
     def _sentence(self, advice: str) -> str:
         if not advice:
-            return "Enough: press Next."
-        if self._offer.why == "Hold still.":
-            return "Hold the board still."
+            return tr("Enough: press Next.")
+        if self._offer.why == tr("Hold still."):
+            return tr("Hold the board still.")
         return advice
 
     def _annotated(self) -> dict[str, AnnotatedPicture]:
@@ -195,7 +198,7 @@ class ShowStep(BoardFinder, FilmedStep):
 class TableStep(BoardFinder):
     """Where the world is: at the first camera, or on the table under the board."""
 
-    title = "The table"
+    title = tr_noop("The table")
     captures = True
 
     def __init__(self, board_step: BoardStep, solve: SolveStep, cameras: tuple[str, ...]) -> None:
@@ -233,11 +236,12 @@ class TableStep(BoardFinder):
         wrong = self.world is not None and not self.world.verdict.acceptable
         if self.world is None:
             first = (self.cameras or ("first",))[0]
-            sentence = "Lay the board flat on the table and press Space, or press Next."
+            sentence = tr("Lay the board flat on the table and press Space, or press Next.")
             hint = self.problem or self.search.missing or (
-                f"Without a table the world begins at camera {first}, and the scene is not level.")
+                tr("Without a table the world begins at camera {first}, and the scene is not level.", first=first))
         else:
-            sentence = "Lay the board flat and press Space again." if wrong else "The table is known: press Next."
+            sentence = tr("Lay the board flat and press Space again.") if wrong else tr("The table is known: press "
+                                                                                        "Next.")
             hint = ""
         return StepView(sentence, done=not wrong and self.world is not None, hint=hint,
                         annotated=self.search.annotated(self.board),

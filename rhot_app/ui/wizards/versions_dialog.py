@@ -17,6 +17,7 @@ from rhot_app.rig_history import Version
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
+from rhot_app.ui.language import date_text, tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.models.proposal import set_rig
 from rhot_app.ui.wizards.framework.page import RowTable
@@ -30,7 +31,7 @@ class VersionsDialog(QDialog):
     def __init__(self, path: Path, rig: Rig, connect: Callable[[], Asker], scheme: Scheme,
                  parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Earlier calibrations")
+        self.setWindowTitle(tr("Earlier calibrations"))
         self.setProperty("guide", "calibration")
         self.resize(1000, 560)
         self._path = path
@@ -46,11 +47,11 @@ class VersionsDialog(QDialog):
         self.list.currentRowChanged.connect(self._show_version)
         self.table = RowTable(scheme, ("", "now", "then"))
         self.sentence = Sentence(2)
-        self.back_button = QPushButton("Bring it back")
-        self.back_button.setToolTip("Puts the chosen version into force. What is there now is kept, and can be brought "
-                                    "back the same way.")
+        self.back_button = QPushButton(tr("Bring it back"))
+        self.back_button.setToolTip(tr("Puts the chosen version into force. What is there now is kept, and can be "
+                                       "brought back the same way."))
         self.back_button.clicked.connect(self.bring_back)
-        close = QPushButton("Close")
+        close = QPushButton(tr("Close"))
         close.setAutoDefault(False)
         close.clicked.connect(self.reject)
         middle, buttons = QHBoxLayout(), QHBoxLayout()
@@ -70,12 +71,13 @@ class VersionsDialog(QDialog):
         self._versions = rig_history.versions(self._path)
         self.list.clear()
         for version in self._versions:
-            self.list.addItem(f"{version.replaced_at.astimezone():%d %B %Y, %H:%M}\nbefore {version.replaced_by}")
+            self.list.addItem(tr("{date}\nbefore {reason}", date=date_text(version.replaced_at),
+                                 reason=version.replaced_by))
         self.back_button.setEnabled(bool(self._versions))
         if self._versions:
             self.list.setCurrentRow(0)
         else:
-            self.sentence.setText("Nothing has been replaced yet: there is no earlier calibration of this rig.")
+            self.sentence.setText(tr("Nothing has been replaced yet: there is no earlier calibration of this rig."))
 
     def _show_version(self, number: int) -> None:
         if not 0 <= number < len(self._versions):
@@ -89,7 +91,7 @@ class VersionsDialog(QDialog):
             return
         self.table.show_records(rows)
         self.back_button.setEnabled(bool(rows))
-        self.sentence.setText("" if rows else "This version says the same as the rig does now.")
+        self.sentence.setText("" if rows else tr("This version says the same as the rig does now."))
 
     def bring_back(self) -> None:
         """Put the chosen version into force, in a worker."""
@@ -112,7 +114,7 @@ class VersionsDialog(QDialog):
         self._job = None
         self._rig = rig
         self._list_versions()
-        self.sentence.setText("It is back in force. What was there before stands first in the list now.")
+        self.sentence.setText(tr("It is back in force. What was there before stands first in the list now."))
         self.rig_used.emit(rig)
 
     def _failed(self, sentence: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rhot_app.calibration.colour.colours import ColourReport
+from rhot_app.ui.language import tr
 from rhot_app.ui.wizards.colours.bounds import BoundsPage, BoundsStep
 from rhot_app.ui.wizards.colours.pick import PickPage, PickStep
 from rhot_app.ui.wizards.colours.separation import SeparationPage, SeparationStep
@@ -23,7 +24,7 @@ def make_wizard(context: WizardContext) -> Definition:
         assert apart.report is not None
         return replace(result, verdict=apart.report.verdict)
 
-    accept = accept_result(context, apart, "Pick the markers' colours first.", judged_now)
+    accept = accept_result(context, apart, tr("Pick the markers' colours first."), judged_now)
     pages = (PickPage(picks, context.scheme), BoundsPage(bounds, context.scheme), SeparationPage(apart, context.scheme),
              accept)
     return Definition(pages)

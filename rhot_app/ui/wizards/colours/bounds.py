@@ -8,6 +8,7 @@ import msgspec
 from PySide6.QtWidgets import QHBoxLayout
 
 from rhot_app.calibration.registry import Calibration, InForce
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.colours.masks import MaskChoice, MaskedPictures, MaskMaker, Show, annotated_by_masks, drift_of
 from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow, paint_button
@@ -18,16 +19,17 @@ from rhot_app.ui.wizards.framework.step import Pictures, SolveStep, StepView
 from rhot_node.markers import ChromaModel, MarkerSet
 
 BOUNDS: tuple[Control, ...] = (
-    Control("hue_tolerance_deg", "Hue, either way", "How far a pixel's hue may be from the marker's. Wider bears more "
-            "shade and other lamps; narrower takes less of what has a similar colour.",
-            2.0, 45.0, 90.0, 14.0, unit="°", decimals=1, optional=False, least=1.0),
-    Control("magnitude_min", "Least colour", "How far from grey a pixel must be, in grey levels of chroma. Less bears "
-            "deeper shade; more leaves out pale things.", 4.0, 120.0, 180.0, 24.0, decimals=1, optional=False,
-            least=4.0),
-    Control("luma_min", "Darkest", "Pixels darker than this are noise.", 0.0, 255.0, 255.0, 12.0, decimals=0,
-            optional=False),
-    Control("luma_max", "Brightest", "Pixels brighter than this are burnt highlights.", 0.0, 255.0, 255.0, 250.0,
+    Control("hue_tolerance_deg", tr_noop("Hue, either way"),
+            tr_noop("How far a pixel's hue may be from the marker's. Wider bears more shade and other lamps; narrower "
+                    "takes less of what has a similar colour."), 2.0, 45.0, 90.0, 14.0, unit="°", decimals=1,
+            optional=False, least=1.0),
+    Control("magnitude_min", tr_noop("Least colour"),
+            tr_noop("How far from grey a pixel must be, in grey levels of chroma. Less bears deeper shade; more leaves "
+                    "out pale things."), 4.0, 120.0, 180.0, 24.0, decimals=1, optional=False, least=4.0),
+    Control("luma_min", tr_noop("Darkest"), tr_noop("Pixels darker than this are noise."), 0.0, 255.0, 255.0, 12.0,
             decimals=0, optional=False),
+    Control("luma_max", tr_noop("Brightest"), tr_noop("Pixels brighter than this are burnt highlights."), 0.0, 255.0,
+            255.0, 250.0, decimals=0, optional=False),
 )
 
 
@@ -37,9 +39,8 @@ class BoundsStep(SolveStep):
     watches = True
 
     def __init__(self, calibration: Calibration, now: InForce, picks: PickStep) -> None:
-        super().__init__(calibration, now,
-                         lambda: observations(picks, {}) if picks.gathering.names else None,
-                         "Learning the colours …", "Check the mask", "Go back and pick a colour.")
+        super().__init__(calibration, now, lambda: observations(picks, {}) if picks.gathering.names else None,
+                         tr("Learning the colours …"), tr("Check the mask"), tr("Go back and pick a colour."))
         self.cameras = picks.cameras
         self.picks = picks
         self.given: dict[str, ChromaModel] = {}
@@ -139,13 +140,14 @@ class BoundsStep(SolveStep):
         chosen = self.markers.ids.index(self.chosen) if self.show == "chosen" else None
         index = self.markers.ids.index(self.chosen)
         found = [picture.seen[index].found for picture in self._masked.values()]
-        hint = f"{self.chosen} is found by {sum(found)} of {len(found)} cameras." if found else ""
+        hint = tr("{chosen} is found by {sum} of {found} cameras.", chosen=self.chosen, sum=sum(found),
+                  found=len(found)) if found else ""
         hint = " ".join([hint, *(f"{name}: {picture.why(index)}" for name, picture in self._masked.items()
                                  if picture.why(index))])
         drift = drift_of(self._masked)
         if drift:
-            hint = f"Since the colours were picked: {drift[0].sentence}"
-        return StepView("The mask must fit the markers.", done=True, hint=hint,
+            hint = tr("Since the colours were picked: {sentence}", sentence=drift[0].sentence)
+        return StepView(tr("The mask must fit the markers."), done=True, hint=hint,
                         annotated=annotated_by_masks(self._masked, self.markers, chosen, self.show))
 
 
@@ -166,8 +168,9 @@ class BoundsPage(Page):
         self.list = PaintList(scheme, ("marker", "hue"))
         self.mask_choice = MaskChoice()
         self.rows = {control.field: ControlRow(control) for control in BOUNDS}
-        self.again = paint_button("As learnt", "The chosen marker's bounds as they were learnt from the samples.")
-        self.undo_button = paint_button("Undo", "Ctrl+Z. The last change back.")
+        self.again = paint_button(tr("As learnt"),
+                                  tr("The chosen marker's bounds as they were learnt from the samples."))
+        self.undo_button = paint_button(tr("Undo"), tr("Ctrl+Z. The last change back."))
         self.column.addWidget(self.list, 1)
         shrinkable(self.list)
         for row in self.rows.values():
@@ -220,4 +223,4 @@ class BoundsPage(Page):
         marker = step.markers.markers[step.markers.ids.index(name)]
         text = f"± {marker.chroma.hue_tolerance_deg:.0f}°"
         return PaintRow(name, marker.display_rgb, "half" if name in step.given else "tick",
-                        f"{text}, by hand" if name in step.given else text)
+                        tr("{text}, by hand", text=text) if name in step.given else text)

@@ -14,6 +14,7 @@ from rhot_app.calibration.colour.cause import Cause, Explainer
 from rhot_app.calibration.colour.illuminant import DriftReport, IlluminantDrift, drift_findings
 from rhot_app.calibration.verdict import Finding
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.drawing import Callout, Dots, Layer, Overlay
 from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Pictures
 from rhot_node.detect.fast import FastDetector
@@ -44,7 +45,10 @@ class MaskedPicture:
     def why(self, index: int) -> str:
         """In words, why a marker is not found or in doubt; empty for one in plain view."""
         cause = self.causes.get(index)
-        return "" if cause is None else f"{'doubtful' if self.seen[index].found else 'not found'}. {cause.sentence}"
+        if cause is None:
+            return ""
+        how = tr("doubtful") if self.seen[index].found else tr("not found")
+        return f"{how}. {cause.sentence}"
 
 
 MaskedPictures = dict[str, MaskedPicture]
@@ -120,7 +124,8 @@ def mask_overlay(picture: MaskedPicture, markers: MarkerSet, chosen: int | None)
     return tuple(marks)
 
 
-_SHOWN = (("all", "Mask of all markers"), ("chosen", "Mask of the chosen marker"), ("none", "Picture without mask"))
+_SHOWN = (("all", tr_noop("Mask of all markers")), ("chosen", tr_noop("Mask of the chosen marker")),
+          ("none", tr_noop("Picture without mask")))
 
 
 class MaskChoice(QComboBox):
@@ -129,5 +134,6 @@ class MaskChoice(QComboBox):
     def __init__(self) -> None:
         super().__init__()
         for value, text in _SHOWN:
-            self.addItem(text, value)
-        self.setToolTip("The mask is what the detector really takes for each marker, pixel by pixel, in this light.")
+            self.addItem(tr(text), value)
+        self.setToolTip(tr("The mask is what the detector really takes for each marker, pixel by pixel, in this "
+                           "light."))

@@ -10,6 +10,7 @@ from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.colours.masks import MaskChoice, MaskedPictures, MaskMaker, Show, annotated_by_masks, drift_of
 from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow, paint_button
@@ -26,7 +27,7 @@ _PARTS = 10  # of a marker's variety after which its colour is learnt anew
 class PickStep(Step):
     """Every marker of the set in turn: choose it, click its paint. Space holds the pictures, to click in them."""
 
-    title = "Pick the colours"
+    title = tr_noop("Pick the colours")
     watches = captures = True
 
     def __init__(self, markers: MarkerSet, cameras: tuple[str, ...]) -> None:
@@ -142,24 +143,26 @@ class PickStep(Step):
     def doubt(self, name: str) -> str:
         """In a few words, what is wrong with a marker's colour; empty when nothing is."""
         if name in self.identity.skin:
-            return "as skin"
+            return tr("as skin")
         same = [pair for pair in self.identity.same if name in pair[:2]]
         if same:
-            return f"as {same[0][1] if same[0][0] == name else same[0][0]}"
-        return next((f"was {other}'s" for marker, other in self.identity.taken if marker == name), "")
+            return tr("as {other}", other=same[0][1] if same[0][0] == name else same[0][0])
+        return next((tr("was {other}'s", other=other) for marker, other in self.identity.taken if marker == name), "")
 
     def _verdict(self) -> Verdict | None:
         """What is wrong with the colours picked so far; None when nothing is."""
-        again = "Click the right paint; Ctrl+Z takes the last click back."
-        findings = [Finding("skin", Grade.POOR, f"{name} has the colour of skin: {shown}.", "", again)
-                    for name, shown in self.identity.skin.items()]
-        findings += [Finding("same-colour", Grade.POOR, f"{first} and {second} have one colour: their hues are "
-                             f"{apart:.0f}° apart.", "", again) for first, second, apart in self.identity.same]
+        again = tr("Click the right paint; Ctrl+Z takes the last click back.")
+        findings = [Finding("skin", Grade.POOR, tr("{name} has the colour of skin: {shown}.", name=name, shown=shown),
+                            "", again) for name, shown in self.identity.skin.items()]
+        findings += [Finding("same-colour", Grade.POOR, tr("{first} and {second} have one colour: their hues are "
+                                                           "{apart:.0f}° apart.", first=first, second=second,
+                                                           apart=apart), "", again) for first, second,
+                     apart in self.identity.same]
         if self.identity.exchanged:
             findings.append(Finding("exchanged", Grade.FAIR, self.identity.exchanged, "",
-                                    "If the hand does not wear them so, click these again."))
+                                    tr("If the hand does not wear them so, click these again.")))
         doubtful = [name for name in self.base.ids if self.doubt(name)]
-        return judge(f"look at {', '.join(doubtful)} again.", findings) if findings else None
+        return judge(tr("look at {names} again.", names=", ".join(doubtful)), findings) if findings else None
 
     @property
     def _wrong(self) -> str:
@@ -171,8 +174,9 @@ class PickStep(Step):
         """Which paint to show next, and how much has been seen of those named."""
         names, gathering = self.gathering.names, self.gathering
         seen = sum(gathering.variety(name) for name in names) / len(names) if names else 0.0
-        bars = (Bar("picked", len(names) / len(self.base.ids), f"{len(names)} of {len(self.base.ids)} markers"),
-                Bar("seen moving", seen, "places and angles at which the markers were seen so far"))
+        bars = (Bar("picked", len(names) / len(self.base.ids),
+                    tr("{names} of {ids} markers", names=len(names), ids=len(self.base.ids))),
+                Bar(tr("seen moving"), seen, tr("places and angles at which the markers were seen so far")))
         return StepView(self._sentence(),
                         done=gathering.enough and len(names) == len(self.base.ids) and not self._wrong,
                         passable=bool(names), hint=self.problem or self._hint(), bars=bars, verdict=self._verdict(),
@@ -180,35 +184,37 @@ class PickStep(Step):
 
     def _sentence(self) -> str:
         if self.held:
-            return f"Click {self._paint()} in the held picture."
+            return tr("Click {paint} in the held picture.", paint=self._paint())
         if len(self.gathering.names) < len(self.base.ids):
-            return f"Click {self._paint()}, or drag over it."
+            return tr("Click {paint}, or drag over it.", paint=self._paint())
         if self._wrong:
-            return f"Choose {self._wrong} and click its paint."
+            return tr("Choose {wrong} and click its paint.", wrong=self._wrong)
         if not self.gathering.enough:
-            return "Move and turn the hand slowly, near and far."
-        return "Enough: press Next."
+            return tr("Move and turn the hand slowly, near and far.")
+        return tr("Enough: press Next.")
 
     def _paint(self) -> str:
-        return "bare skin" if self.chosen == SKIN else f"the paint of {self.chosen}"
+        return tr("bare skin") if self.chosen == SKIN else tr("the paint of {chosen}", chosen=self.chosen)
 
     def _hint(self) -> str:
         if self._wrong:
-            return f"{self._wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z."
+            return tr("{wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z.",
+                      wrong=self._wrong)
         if self.gathering.names and not len(self.gathering.skin):
-            return "Pick bare skin too: then it is said whether a marker looks like it."
+            return tr("Pick bare skin too: then it is said whether a marker looks like it.")
         drift = () if self.gathering.names else drift_of(self._masked)
         if drift:
-            return f"By the rig's colours: {drift[0].figure}"
+            return tr("By the rig's colours: {figure}", figure=drift[0].figure)
         if not self.gathering.names:
-            return "Space holds the pictures, if your hands are full."
-        unseen = [f"{camera} has not seen {name}: {picture.why(self.base.ids.index(name))}"
-                  for camera, picture in self._masked.items() for name in self.gathering.unseen_by(camera)
+            return tr("Space holds the pictures, if your hands are full.")
+        unseen = [tr("{camera} has not seen {name}: {why}", camera=camera, name=name,
+                     why=picture.why(self.base.ids.index(name))) for camera,
+                  picture in self._masked.items() for name in self.gathering.unseen_by(camera)
                   if picture.why(self.base.ids.index(name))]
         if unseen:
             return unseen[0]
         missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]
-        return f"Still to be seen in other places: {', '.join(missing)}." if missing else ""
+        return tr("Still to be seen in other places: {names}.", names=", ".join(missing)) if missing else ""
 
     def _annotated(self) -> dict[str, AnnotatedPicture]:
         chosen = self.base.ids.index(self.chosen) if self.show == "chosen" and self.chosen != SKIN else None
@@ -223,13 +229,14 @@ class PickPage(Page):
         self._picks = step
         self.pickable = self.one_large = True
         self.list = PaintList(scheme, ("marker", "pictures"))
-        self.list.setToolTip("Choose what to click next. The patches are the rig's colour and the one picked. A tick: "
-                             "enough places and angles were seen; a cross: the colour is another marker's or the "
-                             "skin's. Ctrl+Z takes the last click back; clicking a marker anew replaces what was "
-                             "gathered for it.")
+        self.list.setToolTip(tr("Choose what to click next. The patches are the rig's colour and the one picked. A "
+                                "tick: enough places and angles were seen; a cross: the colour is another marker's or "
+                                "the skin's. Ctrl+Z takes the last click back; clicking a marker anew replaces what "
+                                "was gathered for it."))
         self.mask_choice = MaskChoice()
-        self.hold = paint_button("Hold the pictures", "Space. Then click at leisure; Space again lets them go on.")
-        self.undo_button = paint_button("Undo", "Ctrl+Z. The last click back.")
+        self.hold = paint_button(tr("Hold the pictures"),
+                                 tr("Space. Then click at leisure; Space again lets them go on."))
+        self.undo_button = paint_button(tr("Undo"), tr("Ctrl+Z. The last click back."))
         for widget in (self.list, self.mask_choice, self.hold, self.undo_button):
             self.column.addWidget(widget, 1 if widget is self.list else 0)
         shrinkable(self.list)
@@ -261,18 +268,18 @@ class PickPage(Page):
     def show_view(self, view: StepView) -> None:
         """The list; the button says what it would do."""
         self.list.show_rows(tuple(self._row(name) for name in self._picks.names), self._picks.chosen)
-        self.hold.setText("Let the pictures go on" if view.pictures else "Hold the pictures")
+        self.hold.setText(tr("Let the pictures go on") if view.pictures else tr("Hold the pictures"))
         self.undo_button.setEnabled(self._picks.undoable)
 
     def _row(self, name: str) -> PaintRow:
         gathering = self._picks.gathering
         if name == SKIN:
             count = len(gathering.skin)
-            return PaintRow(name, None, "tick" if count else "ring", "picked" if count else "not picked")
+            return PaintRow(name, None, "tick" if count else "ring", "picked" if count else tr("not picked"))
         index = self._picks.base.ids.index(name)
         before, now = (markers.markers[index].display_rgb for markers in (self._picks.base, self._picks.markers))
         if name not in gathering.names:
-            return PaintRow(name, None, "ring", "not picked", before)
+            return PaintRow(name, None, "ring", tr("not picked"), before)
         doubt = self._picks.doubt(name)
         state = "cross" if doubt else "tick" if gathering.variety(name) >= 1.0 else "half"
         return PaintRow(name, now, state, doubt or str(gathering.pictures(name)), before)

@@ -17,6 +17,7 @@ from rhot_app.calibration.registry import Calibration, InForce
 from rhot_app.calibration.verdict import Finding, with_findings
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.theme import app_font
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.colours.bounds import BoundsStep, observations
 from rhot_app.ui.wizards.colours.masks import MaskMaker, drift_of
@@ -29,11 +30,11 @@ class SeparationStep(SolveStep):
     """The verdict on the colours with the bounds that a person has left them, and on the light since then."""
 
     watches = True
-    advice = "Read what may be mistaken for a marker, then go on."
+    advice = tr_noop("Read what may be mistaken for a marker, then go on.")
 
     def __init__(self, calibration: Calibration, now: InForce, bounds: BoundsStep) -> None:
-        super().__init__(calibration, now, self._judging, "Trying the new bounds …", "Tell them apart",
-                         "Go back and pick a colour.")
+        super().__init__(calibration, now, self._judging, tr("Trying the new bounds …"), tr("Tell them apart"),
+                         tr("Go back and pick a colour."))
         self.cameras = bounds.cameras
         self._bounds = bounds
         self._learnt: ColourReport | None = None
@@ -67,7 +68,7 @@ class SeparationStep(SolveStep):
         if self.result is None:
             return super().view()
         apart = self.result.separability.sentences
-        return replace(super().view(), hint="; ".join(apart[:3]) + "." if apart else "No two colours overlap.")
+        return replace(super().view(), hint="; ".join(apart[:3]) + "." if apart else tr("No two colours overlap."))
 
 
 _ROW_PX = 28
@@ -89,19 +90,19 @@ class SeparationPage(Page):
         self.table: RecordTable[ColourShares] = RecordTable((), selectable=False)
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.table.setAccessibleName("Which colour is taken for which")
+        self.table.setAccessibleName(tr("Which colour is taken for which"))
         self.table.setWordWrap(False)
         self.table.setStyleSheet("QHeaderView::section { padding: 4px 0 } QTableView::item { padding: 0 }")
-        caption = QLabel("The table: how much of each column's colour is taken for the marker of the row, in %, over "
-                         "all lamps that may come; of a marker's own colour by the lamp where that is least.")
+        caption = QLabel(tr("The table: how much of each column's colour is taken for the marker of the row, in %, "
+                            "over all lamps that may come; of a marker's own colour by the lamp where that is least."))
         caption.setWordWrap(True)
         self.centre = QWidget()
         column = QVBoxLayout(self.centre)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.charts, 1)
         column.addWidget(self.table)
-        note = QLabel("The chart: the blue line shows which hues the room has, and how much of each. Where it rises "
-                      "inside a marker's band, the room has things of that marker's colour.")
+        note = QLabel(tr("The chart: the blue line shows which hues the room has, and how much of each. Where it rises "
+                         "inside a marker's band, the room has things of that marker's colour."))
         note.setWordWrap(True)
         note.setProperty("muted", True)
         self.column.addWidget(caption)

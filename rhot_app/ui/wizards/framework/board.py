@@ -31,6 +31,7 @@ from rhot_app.calibration.board.standard_board import BOARD, KINDS, MARKER_SHARE
 from rhot_app.calibration.board.target import write_target
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import SettingsStore
 from rhot_app.ui.wizards.framework.drawing import board_marks
 from rhot_app.ui.wizards.framework.page import Page
@@ -40,7 +41,7 @@ DICTIONARIES = (DEFAULT_DICTIONARY, "DICT_4X4_250", "DICT_5X5_100", "DICT_5X5_25
                 "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11")
 _WHY_S = 2.0  # between looks into why no board is seen
 _JUDGED, _JUDGED_LEAST = 30, 4  # views that judge the board's size
-UNMEASURED = "Next waits for this size: every length that is measured later comes from it."
+UNMEASURED = tr_noop("Next waits for this size: every length that is measured later comes from it.")
 Kind = Literal["chessboard", "charuco", "aprilgrid", "circles"]
 SIZES: dict[str, tuple[int, int]] = {kind: parse_size(size) for kind, (size, _) in KINDS.items()}
 """Of the boards that are printed where nobody says otherwise."""
@@ -160,16 +161,16 @@ class BoardSearch:
     def missing(self) -> str:
         """Why no camera sees the board, in a sentence; empty while one does, or nobody has looked into it."""
         unseen = all(view is None for view in self.views.values())
-        return f"Not seen: {self._missing}." if unseen and self._missing else ""
+        return tr("Not seen: {missing}.", missing=self._missing) if unseen and self._missing else ""
 
 
-OTHER_BOARD = "Go back: the board is another one than the form says."
+OTHER_BOARD = tr_noop("Go back: the board is another one than the form says.")
 
 
 class BoardStep(Step):
     """Choose the board, and see at once whether the cameras recognise it."""
 
-    title = "Your board"
+    title = tr_noop("Your board")
     watches = True
 
     def __init__(self, fields: BoardFields, cameras: tuple[str, ...] | None = None) -> None:
@@ -227,30 +228,32 @@ class BoardStep(Step):
     def view(self) -> StepView:
         """The question, and whether the answer fits what is seen."""
         if self.board is None:
-            return StepView("Say which board you hold.", hint=self.problem)
+            return StepView(tr("Say which board you hold."), hint=self.problem)
         search = self._search
         annotated, found = search.annotated(self.board), sum(view is not None for view in search.views.values())
         wrong = search.size_finding(self.board)
         if wrong is not None:
-            return StepView("Count the corners again.", hint=f"{wrong.figure} {wrong.cause}", annotated=annotated)
+            return StepView(tr("Count the corners again."), hint=f"{wrong.figure} {wrong.cause}", annotated=annotated)
         if self._fields.square_mm is None:
-            hint = " ".join(filter(None, (UNMEASURED, self._hint())))
-            return StepView(f"Measure the {self.board.parts} and type their size.", hint=hint, annotated=annotated)
+            hint = " ".join(filter(None, (tr(UNMEASURED), self._hint())))
+            return StepView(tr("Measure the {parts} and type their size.", parts=self.board.parts), hint=hint,
+                            annotated=annotated)
         return StepView(self._sentence(found), done=search.recognised, passable=True,
                         hint=self._hint(), annotated=annotated)
 
     def _sentence(self, found: int) -> str:
         if found == 0:
-            return "Seen: this is the board. Press Next." if self._search.recognised else "Show the board to check it."
+            return tr("Seen: this is the board. Press Next.") if self._search.recognised else tr("Show the board to "
+                                                                                                 "check it.")
         names = " and ".join(name for name, view in self._search.views.items() if view is not None)
-        return f"Seen by {names}: this is the board."
+        return tr("Seen by {names}: this is the board.", names=names)
 
     def _hint(self) -> str:
         if self._search.missing:
             return self._search.missing
         if self.board is not None and not self.board.one_way_up:
-            return ("This board looks the same turned by 180°: hold it the same way up all the time, or use one with "
-                    "an even and an odd number of corners, or with an odd number of rows of circles.")
+            return (tr("This board looks the same turned by 180°: hold it the same way up all the time, or use one "
+                       "with an even and an odd number of corners, or with an odd number of rows of circles."))
         return ""
 
 
@@ -262,8 +265,8 @@ def usual_marker_mm(square_mm: float) -> float:
 # -- the form ----------------------------------------------------------------------------------------------------------
 
 MEMORY = "board"
-_NOTE = ("Measure ten with a ruler and divide by ten: printers scale. The scale of everything that is measured later "
-         "comes from this number.")
+_NOTE = (tr_noop("Measure ten with a ruler and divide by ten: printers scale. The scale of everything that is measured "
+                 "later comes from this number."))
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,15 +281,18 @@ class _Words:
 
 
 _WORDS = {
-    "chessboard": _Words("Chessboard", "Inner corners", "Count the points where four squares meet: a board of 10 × 7 "
-                         "squares has 9 × 6.", "Square, mm", "The side of one square as it came out of the printer."),
-    "charuco": _Words("ChArUco board", "Squares", "Count the squares.", "Square, mm",
-                      "The side of one square as it came out of the printer."),
-    "aprilgrid": _Words("AprilGrid (Kalibr)", "Tags", "Count the tags: tagCols, tagRows of Kalibr's file.", "Tag, mm",
-                        "The side of a tag's black square, tagSize in Kalibr's file (which has metres)."),
-    "circles": _Words("Circles, asymmetric", "Circles", "Count the circles in one row, and then the rows: 4 × 11 is "
-                      "usual.", "Spacing, mm", "From one row of circles to the next, which is half as far as from one "
-                      "circle to the next in its row."),
+    "chessboard": _Words(tr_noop("Chessboard"), tr_noop("Inner corners"),
+                         tr_noop("Count the points where four squares meet: a board of 10 × 7 squares has 9 × 6."),
+                         tr_noop("Square, mm"), tr_noop("The side of one square as it came out of the printer.")),
+    "charuco": _Words(tr_noop("ChArUco board"), tr_noop("Squares"), tr_noop("Count the squares."),
+                      tr_noop("Square, mm"), tr_noop("The side of one square as it came out of the printer.")),
+    "aprilgrid": _Words("AprilGrid (Kalibr)", tr_noop("Tags"),
+                        tr_noop("Count the tags: tagCols, tagRows of Kalibr's file."), tr_noop("Tag, mm"),
+                        tr_noop("The side of a tag's black square, tagSize in Kalibr's file (which has metres).")),
+    "circles": _Words(tr_noop("Circles, asymmetric"), tr_noop("Circles"),
+                      tr_noop("Count the circles in one row, and then the rows: 4 × 11 is usual."),
+                      tr_noop("Spacing, mm"), tr_noop("From one row of circles to the next, which is half as far as "
+                                                      "from one circle to the next in its row.")),
 }
 
 
@@ -301,30 +307,32 @@ class BoardPage(Page):
         self._shown: BoardFields | None = None
         self.kind = QComboBox()
         for value, words in _WORDS.items():
-            self.kind.addItem(words.name, value)
+            self.kind.addItem(tr(words.name), value)
         self.cols, self.rows = _count(), _count()
         self.square, self.marker = LengthField(), LengthField()
         self.spacing = QDoubleSpinBox()
         self.spacing.setRange(0.1, 1.0)
         self.spacing.setSingleStep(0.05)
-        self.spacing.setToolTip("The gap between two tags as a part of their side, tagSpacing in Kalibr's file.")
+        self.spacing.setToolTip(tr("The gap between two tags as a part of their side, tagSpacing in Kalibr's file."))
         self.dictionary = QComboBox()
         self.dictionary.addItems(DICTIONARIES)
-        self.legacy = QCheckBox("printed with OpenCV before 4.6")
-        self.legacy.setToolTip("Older programs began ChArUco boards with an even number of rows with a white square.")
+        self.legacy = QCheckBox(tr("printed with OpenCV before 4.6"))
+        self.legacy.setToolTip(tr("Older programs began ChArUco boards with an even number of rows with a white "
+                                  "square."))
         self._form = QFormLayout()
         self._form.setSpacing(8)
         self._cols_label, self._rows_label, self._square_label = QLabel(), QLabel(), QLabel()
-        for label, field in (("Board", self.kind), (self._cols_label, self.cols), (self._rows_label, self.rows),
-                             (self._square_label, self.square), ("Gap, of a tag", self.spacing),
-                             ("Marker, mm", self.marker), ("Family", self.dictionary)):
+        for label, field in ((tr("Board"), self.kind), (self._cols_label, self.cols), (self._rows_label, self.rows),
+                             (self._square_label, self.square), (tr("Gap, of a tag"), self.spacing),
+                             (tr("Marker, mm"), self.marker), (tr("Family"), self.dictionary)):
             self._form.addRow(label, field)
         self._form.addRow(self.legacy)
-        self.print_button = QPushButton("Print this board")
+        self.print_button = QPushButton(tr("Print this board"))
         self.print_button.setAutoDefault(False)
-        self.print_button.setToolTip("Writes it as a PDF of the usual size with a ruler, and opens that to be printed.")
+        self.print_button.setToolTip(tr("Writes it as a PDF of the usual size with a ruler, and opens that to be "
+                                        "printed."))
         self.print_button.clicked.connect(self._print)
-        self.note = QLabel(_NOTE)
+        self.note = QLabel(tr(_NOTE))
         self.note.setWordWrap(True)
         self.note.setProperty("muted", True)
         self.column.addLayout(self._form)
@@ -332,7 +340,8 @@ class BoardPage(Page):
         self.column.addWidget(self.note)
         self.column.addStretch(1)
         self.first_field = self.square
-        self.twin_facts = f"Shows a board: {BOARD} inner corners, squares of {SQUARE_MM:g} mm."
+        self.twin_facts = tr("Shows a board: {board} inner corners, squares of {square_mm:g} mm.", board=BOARD,
+                             square_mm=SQUARE_MM)
         for box in (self.kind, self.dictionary):  # in a small window a bar of scrolling stands beside
             box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             box.setMinimumContentsLength(8)
@@ -398,7 +407,7 @@ class BoardPage(Page):
         self.legacy.setChecked(fields.legacy)
         self._filling = False
         last = remembered_fields(self._memory.remembered(MEMORY)).square_mm
-        self.square.setPlaceholderText("measure it" if last is None else f"last time {last:g}")
+        self.square.setPlaceholderText(tr("measure it") if last is None else tr("last time {last:g}", last=last))
         self._shown = fields
         self._show_kind(fields)
 
@@ -409,14 +418,15 @@ class BoardPage(Page):
         self._form.setRowVisible(self.spacing, fields.kind == "aprilgrid")
         self.legacy.setVisible(charuco and fields.rows % 2 == 0)
         usual = "" if fields.square_mm is None else f"{usual_marker_mm(fields.square_mm):g}"
-        self.marker.setPlaceholderText(usual or "three quarters of a square")
+        self.marker.setPlaceholderText(usual or tr("three quarters of a square"))
         words = _WORDS[fields.kind]
-        self._cols_label.setText(f"{words.counted} across")
-        self._rows_label.setText("Rows of circles" if fields.kind == "circles" else f"{words.counted} down")
-        self._square_label.setText(words.measured)
-        self.square.setToolTip(words.measuring)
+        self._cols_label.setText(tr("{counted} across", counted=tr(words.counted)))
+        self._rows_label.setText(tr("Rows of circles") if fields.kind == "circles"
+                                 else tr("{counted} down", counted=tr(words.counted)))
+        self._square_label.setText(tr(words.measured))
+        self.square.setToolTip(tr(words.measuring))
         for box in (self.cols, self.rows):
-            box.setToolTip(words.counting)
+            box.setToolTip(tr(words.counting))
 
     def _print(self) -> None:
         """Write the board beside the recordings and open it, so that the desktop's own program prints it."""
@@ -430,9 +440,10 @@ class BoardPage(Page):
             self.note.setText(str(exc))
             return
         except OSError as exc:
-            self.note.setText(f"{path.parent}: cannot be made ({exc.strerror}), so there is no board to print.")
+            self.note.setText(tr("{parent}: cannot be made ({strerror}), so there is no board to print.",
+                                 parent=path.parent, strerror=exc.strerror))
             return
-        self.note.setText(f"{_told(path)} Print it at 100 % and glue it flat. {_NOTE}")
+        self.note.setText(tr("{told} Print it at 100 % and glue it flat. {note}", told=_told(path), note=tr(_NOTE)))
 
     def show_view(self, view: StepView) -> None:
         """Ctrl+Z may have brought something back."""
@@ -474,5 +485,5 @@ def _paper() -> str:
 def _told(path: Path) -> str:
     """Open the file; where it is, in words."""
     if QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
-        return f"Written to {path} and opened."
-    return f"Written to {path}; this desktop opens no PDF."
+        return tr("Written to {path} and opened.", path=path)
+    return tr("Written to {path}; this desktop opens no PDF.", path=path)

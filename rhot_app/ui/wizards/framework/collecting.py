@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rhot_app.calibration.collect import Bar, Measurements, Movement, WhileTracking
+from rhot_app.ui.language import tr
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.movement import Movements, MovementStep
 from rhot_app.ui.wizards.framework.page import ChartPage, Page
@@ -29,8 +30,8 @@ def make_wizard(context: WizardContext) -> Definition:
         found = tuple(_collected(page.step) for page in pages)
         return None if None in found else found
 
-    solve = SolveStep(context.calibration, context.now, observations, f"{context.calibration.title} …")
-    accept = accept_result(context, solve, "Go back: something was not recorded yet.")
+    solve = SolveStep(context.calibration, context.now, observations, f"{tr(context.calibration.title)} …")
+    accept = accept_result(context, solve, tr("Go back: something was not recorded yet."))
     return Definition((*pages, ChartPage(solve, context.scheme), accept), None if movements is None else movements.end)
 
 
@@ -79,5 +80,6 @@ class MeasurementStep(Step):
     def view(self) -> StepView:
         """How many there are."""
         count, wanted = len(self.found), self._what.count
-        return StepView("Enough: press Next." if count >= wanted else self._what.sentence, done=count >= wanted,
-                        bars=(Bar("taken", count / wanted, f"{count} of {wanted}"),), kept=count)
+        return StepView(tr("Enough: press Next.") if count >= wanted else self._what.sentence, done=count >= wanted,
+                        bars=(Bar("taken", count / wanted, tr("{count} of {wanted}", count=count, wanted=wanted)),),
+                        kept=count)

@@ -9,6 +9,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QCheckBox, QDoubleSpinBox, QGridLayout, QSlider, QWidget
 
+from rhot_app.ui.language import tr
+
 Value = float | None
 
 
@@ -45,9 +47,9 @@ class ControlRow(QWidget):
         self.control = control
         self._filling = False
         self._moving = False
-        self.check_box = QCheckBox(control.name)
-        self.check_box.setToolTip(f"{control.meaning}\nUntick it to leave it to the camera." if control.optional
-                             else control.meaning)
+        self.check_box = QCheckBox(tr(control.name))
+        self.check_box.setToolTip(tr("{meaning}\nUntick it to leave it to the camera.", meaning=tr(control.meaning))
+                                  if control.optional else tr(control.meaning))
         if not control.optional:  # a name, not a choice
             self.check_box.setStyleSheet("QCheckBox { spacing: 0 } QCheckBox::indicator { width: 0; height: 0 }")
             palette = self.check_box.palette()
@@ -59,11 +61,11 @@ class ControlRow(QWidget):
         self.box.setSingleStep(0.1)
         self.box.setSuffix(control.unit)
         self.box.setKeyboardTracking(False)
-        self.box.setToolTip(control.meaning)
-        self.box.setAccessibleName(control.name)
+        self.box.setToolTip(tr(control.meaning))
+        self.box.setAccessibleName(tr(control.name))
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(0, _STEPS)
-        self.slider.setAccessibleName(f"{control.name}, slider")
+        self.slider.setAccessibleName(tr("{name}, slider", name=tr(control.name)))
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(0)

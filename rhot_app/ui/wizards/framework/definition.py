@@ -11,6 +11,7 @@ from rhot_app.calibration.registry import Calibration, InForce
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker, Listener
 from rhot_app.ui.backend.solver import Solver
+from rhot_app.ui.language import tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.page import AcceptPage, Page
 from rhot_app.ui.wizards.framework.step import AcceptStep, SolveStep
@@ -66,12 +67,12 @@ class Definition:
 
 
 def accept_page(context: WizardContext, propose: Callable[[], Proposal | None],
-                missing: str = "There is no result yet.") -> AcceptPage:
+                missing: str = tr_noop("There is no result yet.")) -> AcceptPage:
     """The last page of a wizard: what `propose` gives, beside what is in force."""
     return AcceptPage(AcceptStep(propose, context.now.path, missing), context.scheme)
 
 
-def accept_result(context: WizardContext, solve: SolveStep, missing: str = "There is no result yet.",
+def accept_result(context: WizardContext, solve: SolveStep, missing: str = tr_noop("There is no result yet."),
                   completed: Callable[[Any], Any] = lambda result: result) -> AcceptPage:
     """The same with what the calibration proposes of the result of `solve`, `completed` by what came after it."""
     def propose() -> Proposal | None:

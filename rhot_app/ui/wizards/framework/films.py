@@ -20,6 +20,7 @@ from rhot_app.calibration.verdict import Finding
 from rhot_app.progress import Progress, within
 from rhot_app.sources.film_offset import FilmOffset, offset_sentence, offsets_of
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.board import OTHER_BOARD, BoardSearch
 from rhot_app.ui.wizards.framework.drawing import board_marks
 from rhot_app.ui.wizards.framework.page import Page
@@ -100,29 +101,31 @@ class Films:
         """The search for the board, as long as it was not done."""
         if not self.complete or self.read is not None:
             return None
-        return Task("Looking for the board in the films", read_films,
+        return Task(tr("Looking for the board in the films"), read_films,
                     ({name: self.paths[name] for name in self.cameras}, board, self.began))
 
     def view(self, shown: StepView) -> StepView:
         """What a step that shows a board says while films are chosen; `shown` is what it says of the views it has."""
         if not self.complete:
             missing = next(name for name in self.cameras if name not in self.paths)
-            return StepView(f"Choose the film of {missing}, too.", hint="Or go back to the live cameras.")
+            return StepView(tr("Choose the film of {missing}, too.", missing=missing),
+                            hint=tr("Or go back to the live cameras."))
         if self.read is None:
-            sentence = "Choose another film, or the live cameras." if self.problem else "One moment: films are read."
+            sentence = tr("Choose another film, or the live cameras.") if self.problem else tr("One moment: films are "
+                                                                                               "read.")
             return StepView(sentence, hint=self.problem)
         if self.read.size is not None:
-            return StepView(OTHER_BOARD, hint=f"{self.read.size.figure} {self.read.size.cause}",
+            return StepView(tr(OTHER_BOARD), hint=f"{self.read.size.figure} {self.read.size.cause}",
                             annotated=self.read.stillest)
-        said = f"{len(self.read.shots)} frames were chosen."
+        said = tr("{shots} frames were chosen.", shots=len(self.read.shots))
         if self.read.offsets:
             said += f" {offset_sentence(self.read.offsets, self.began)}"
         if shown.done:
-            sentence = "Enough: press Next."
+            sentence = tr("Enough: press Next.")
         elif shown.may_go_on:
-            sentence = "Press Next. Better: a film in which the board comes to all parts of the picture."
+            sentence = tr("Press Next. Better: a film in which the board comes to all parts of the picture.")
         else:
-            sentence = "Too few: film the board in more places, still in each."
+            sentence = tr("Too few: film the board in more places, still in each.")
         return replace(shown, sentence=sentence, hint=said, annotated=self.read.stillest)
 
 
@@ -161,7 +164,7 @@ class FilmedStep(Step):
             return self.films.view(self.shown())
         wrong = self.other_board
         return self.shown() if wrong is None else replace(
-            self.shown(), sentence=OTHER_BOARD, hint=f"{wrong.figure} {wrong.cause}", done=False, passable=False)
+            self.shown(), sentence=tr(OTHER_BOARD), hint=f"{wrong.figure} {wrong.cause}", done=False, passable=False)
 
     def keep(self, shot: BoardShot) -> None:
         """Take what films show at one moment."""
@@ -190,8 +193,9 @@ class FilmedStep(Step):
 
 # -- the controls ------------------------------------------------------------------------------------------------------
 
-_BEGAN = (("together", "Films began together"), ("sound", "Align by sound"), ("flash", "Align by a flash"))
-_FILTER = f"Films ({' '.join(f'*{suffix}' for suffix in sorted(VIDEO_SUFFIXES))});;All files (*)"
+_BEGAN = (("together", tr_noop("Films began together")), ("sound", tr_noop("Align by sound")),
+          ("flash", tr_noop("Align by a flash")))
+_ENDINGS = " ".join(f"*{suffix}" for suffix in sorted(VIDEO_SUFFIXES))
 
 
 class FilmsPage(Page):
@@ -203,11 +207,11 @@ class FilmsPage(Page):
         self.buttons: dict[str, QPushButton] = {}
         self.began = QComboBox()
         for value, text in _BEGAN:
-            self.began.addItem(text, value)
-        self.began.setToolTip("How it is known by how much one film began later than the other: by what all cameras "
-                              "heard, or by a light that went on once.")
+            self.began.addItem(tr(text), value)
+        self.began.setToolTip(tr("How it is known by how much one film began later than the other: by what all cameras "
+                                 "heard, or by a light that went on once."))
         self.began.currentIndexChanged.connect(self._align)
-        self.live = _button("Live cameras", "Films are left out; views are taken of the live cameras again.")
+        self.live = _button(tr("Live cameras"), tr("Films are left out; views are taken of the live cameras again."))
         self.live.clicked.connect(self._use_live)
         self.column.addWidget(self.began)
         self.column.addWidget(self.live)
@@ -222,8 +226,8 @@ class FilmsPage(Page):
                 button.deleteLater()
             self.buttons = {}
             for place, camera in enumerate(cameras):
-                button = _button("", "A recorded film of the board in place of the live camera: move the board, rest "
-                                 "it for half a second, and move it on. Frames are chosen by themselves.")
+                button = _button("", tr("A recorded film of the board in place of the live camera: move the board, "
+                                        "rest it for half a second, and move it on. Frames are chosen by themselves."))
                 button.clicked.connect(partial(self._choose, camera))
                 self.column.insertWidget(place, button)
                 button.show()
@@ -236,14 +240,15 @@ class FilmsPage(Page):
         films = self._shows.films
         for camera, button in self.buttons.items():
             path = films.paths.get(camera)
-            button.setText(f"Use a film of {camera} …" if path is None else f"{camera}: {path.name}")
+            button.setText(tr("Use a film of {camera} …", camera=camera) if path is None else f"{camera}: {path.name}")
         self.began.setVisible(len(films.cameras) > 1 and bool(films.paths))
         self.live.setVisible(bool(films.paths))
 
     def _choose(self, camera: str) -> None:
         chosen = self._shows.films.paths
         folder = next((path.parent for path in chosen.values()), Path.home())
-        name, _ = QFileDialog.getOpenFileName(self, f"Film of {camera}", str(folder), _FILTER)
+        name, _ = QFileDialog.getOpenFileName(self, tr("Film of {camera}", camera=camera), str(folder),
+                                              tr("Films ({names});;All files (*)", names=_ENDINGS))
         if name:
             self._shows.films.choose(camera, Path(name))
             self.changed.emit()

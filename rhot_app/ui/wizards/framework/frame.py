@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark, paint_shape
 from rhot_app.ui.common.theme import TEXT_PT, app_font
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.definition import Definition
 from rhot_app.ui.wizards.framework.page import Page, VerdictView
@@ -38,6 +39,7 @@ _SENTENCE_LINES = 4
 _RIGHT_PX = 312
 _BELOW_PX = 168
 _BARS_PX = 340
+_STATES = {"current": tr_noop("current"), "done": tr_noop("done"), "to come": tr_noop("to come")}
 
 
 class WizardFrame:
@@ -46,7 +48,7 @@ class WizardFrame:
     def __init__(self, definition: Definition, cameras: tuple[str, ...], work: Work, scheme: Scheme,
                  parent: QWidget) -> None:
         self._shown: Page | None = None
-        self.steps = StepList([page.step.title for page in definition.pages], scheme)
+        self.steps = StepList([tr(page.step.title) for page in definition.pages], scheme)
         self.grid = PictureGrid(cameras, scheme)
         self.middle = QStackedWidget()
         self.middle.addWidget(self.grid)
@@ -66,14 +68,14 @@ class WizardFrame:
         self.below = QStackedWidget()
         self.below.addWidget(self.verdict)
         self.below.addWidget(self.work_view)
-        self.close_button = QPushButton("Close")
-        self.close_button.setToolTip("Escape. Nothing is saved before \"Use this calibration\".")
-        self.back_button = QPushButton("Back")
-        self.back_button.setToolTip("Alt+Left. Nothing is lost.")
-        self.next_button = QPushButton("Next")
+        self.close_button = QPushButton(tr("Close"))
+        self.close_button.setToolTip(tr('Escape. Nothing is saved before "Use this calibration".'))
+        self.back_button = QPushButton(tr("Back"))
+        self.back_button.setToolTip(tr("Alt+Left. Nothing is lost."))
+        self.next_button = QPushButton(tr("Next"))
         self.next_button.setDefault(True)
-        self.twin_button = QPushButton("Simulated hand does …")
-        self.twin_button.setToolTip("The simulated rig only: what stands before its cameras.")
+        self.twin_button = QPushButton(tr("Simulated hand does …"))
+        self.twin_button.setToolTip(tr("The simulated rig only: what stands before its cameras."))
         self.twin_button.hide()
         self.twin_facts = Sentence(2, muted=True)
         for button in (self.close_button, self.back_button, self.twin_button):
@@ -87,7 +89,7 @@ class WizardFrame:
     def _keep_width(self, definition: Definition) -> None:
         """Next is as wide as its longest word, so that Back never comes under a mouse that presses it."""
         steps = [page.step for page in definition.pages]
-        words = {"Next", "Close", *(step.use_label for step in steps if isinstance(step, AcceptStep))}
+        words = {tr("Next"), tr("Close"), *(tr(step.use_label) for step in steps if isinstance(step, AcceptStep))}
         self.next_button.ensurePolished()
         for word in sorted(words, key=len):
             self.next_button.setText(word)
@@ -156,9 +158,9 @@ class WizardFrame:
         self.steps.show_steps(current, done)
         self.grid.show_cameras(step.cameras)
         self.grid.show_view(view)
-        self.sentence.setText(view.sentence)
+        self.sentence.setText(tr(view.sentence))
         working = self.work_view.wanted(step)
-        self.hint.setText(view.hint)
+        self.hint.setText(tr(view.hint))
         self.hint.setVisible(bool(view.hint) and not working)
         self.bars.show_bars(view.bars)
         self.bars.setVisible(bool(view.bars))
@@ -170,11 +172,11 @@ class WizardFrame:
 
     def _show_next(self, view: StepView, step: Step, working: bool) -> None:
         if isinstance(step, AcceptStep):
-            self.next_button.setText("Close" if step.state == "used" else step.use_label)
+            self.next_button.setText(tr("Close") if step.state == "used" else tr(step.use_label))
             self.next_button.setEnabled(step.usable or step.state == "used")
             self.close_button.setVisible(step.state != "used")
         else:
-            self.next_button.setText("Next")
+            self.next_button.setText(tr("Next"))
             self.next_button.setEnabled(view.may_go_on and not working)
             self.close_button.setVisible(True)
 
@@ -235,7 +237,7 @@ class StepList(QWidget):
             label.setProperty("muted", state == "to come")
             label.style().unpolish(label)
             label.style().polish(label)
-            label.setAccessibleName(f"{label.text()}: {state}")
+            label.setAccessibleName(f"{label.text()}: {tr(_STATES[state])}")
 
 
 # -- long work on the screen -------------------------------------------------------------------------------------------
@@ -254,9 +256,9 @@ class WorkView(QWidget):
         self.bar.setTextVisible(False)
         self.remaining = QLabel()
         self.remaining.setProperty("muted", True)
-        self.cancel_button = QPushButton("Cancel")
+        self.cancel_button = QPushButton(tr("Cancel"))
         self.cancel_button.clicked.connect(work.cancel)
-        self.again_button = QPushButton("Begin again")
+        self.again_button = QPushButton(tr("Begin again"))
         self.again_button.clicked.connect(self.again_asked)
         for button in (self.cancel_button, self.again_button):
             button.setAutoDefault(False)
@@ -319,8 +321,8 @@ class BarsView(QWidget):
         if len(bars) != len(self.bars):
             self.updateGeometry()
         self.bars = bars
-        self.setToolTip("\n".join(f"{bar.name}: {bar.meaning}" for bar in bars if bar.meaning))
-        self.setAccessibleName(", ".join(f"{bar.name} {100 * min(bar.fraction, 1.0):.0f} %" for bar in bars))
+        self.setToolTip("\n".join(f"{tr(bar.name)}: {tr(bar.meaning)}" for bar in bars if bar.meaning))
+        self.setAccessibleName(", ".join(f"{tr(bar.name)} {100 * min(bar.fraction, 1.0):.0f} %" for bar in bars))
         self.update()
 
     def paintEvent(self, event: object) -> None:  # noqa: N802
@@ -329,11 +331,11 @@ class BarsView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(app_font())
         metrics = QFontMetricsF(painter.font())
-        room = max((metrics.horizontalAdvance(bar.name) for bar in self.bars), default=0.0) + 12
+        room = max((metrics.horizontalAdvance(tr(bar.name)) for bar in self.bars), default=0.0) + 12
         for row, bar in enumerate(self.bars):
             box = QRectF(0, row * self.row_px, self.width(), self.row_px)
             painter.setPen(QColor(self._scheme.text))
-            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, bar.name)
+            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, tr(bar.name))
             track = QRectF(room, box.center().y() - _BAR_PX / 2, self.width() - room - _TICK_PX - 8, _BAR_PX)
             colour = QColor(self._scheme.good if bar.full else self._scheme.accent)
             painter.setPen(QColor(self._scheme.border))

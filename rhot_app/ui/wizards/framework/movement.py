@@ -19,6 +19,7 @@ from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import WizardContext
 from rhot_app.ui.wizards.framework.page import Page
 from rhot_app.ui.wizards.framework.step import Step, StepView
@@ -120,15 +121,18 @@ class MovementStep(Step):
     def _say(self, elapsed_s: float) -> str:
         if self.phase == "recording":
             assert self._guide is not None
-            return f"{self._guide.sentence()} {max(0.0, self.seconds - elapsed_s):.0f} s left."
+            return tr("{sentence} {left:.0f} s left.", sentence=self._guide.sentence(),
+                      left=max(0.0, self.seconds - elapsed_s))
+        if self.phase == "recorded" and self._shortfall:
+            return tr("{shortfall} Record again.", shortfall=self._shortfall)
         if self.phase == "recorded":
-            return f"{self._shortfall} Record again." if self._shortfall else "Recorded. Go on, or record again."
-        return "One moment." if self.phase in ("beginning", "ending") else self._sentence
+            return tr("Recorded. Go on, or record again.")
+        return tr("One moment.") if self.phase in ("beginning", "ending") else self._sentence
 
     def _bars(self, elapsed_s: float) -> tuple[Bar, ...]:
         done = {"recording": min(elapsed_s / self.seconds, 1.0), "ending": 1.0, "recorded": 1.0}.get(self.phase, 0.0)
         guide = self._guide.bars() if self._guide is not None else ()
-        return (Bar("time", done, f"of {self.seconds:.0f} s recorded"), *guide)
+        return (Bar("time", done, tr("of {seconds:.0f} s recorded", seconds=self.seconds)), *guide)
 
 
 class QuietGuide:
@@ -147,7 +151,7 @@ class QuietGuide:
 
     def bars(self) -> tuple[Bar, ...]:
         """The markers that are measured now."""
-        return (Bar("markers", self._seen, "markers measured by the cameras at this moment"),)
+        return (Bar("markers", self._seen, tr("markers measured by the cameras at this moment")),)
 
     def sentence(self) -> str:
         """The one sentence."""
@@ -160,9 +164,10 @@ class QuietGuide:
 
 # -- the page: one large button; the engine is asked in a worker -------------------------------------------------------
 
-NOTE = "The engine records what the cameras send, into a file that goes when this window closes."
-_LABELS = {"waiting": "Record", "beginning": "Record", "recording": "Stop", "ending": "Stop",
-           "recorded": "Record again"}
+NOTE = tr_noop("The engine records what the cameras send, into a file that goes when this window closes.")
+_LABELS = {"waiting": tr_noop("Record"), "beginning": tr_noop("Record"), "recording": tr_noop("Stop"),
+           "ending": tr_noop("Stop"),
+           "recorded": tr_noop("Record again")}
 
 
 class MovementPage(Page):
@@ -176,9 +181,9 @@ class MovementPage(Page):
         self._job: Job | None = None
         self.button = QPushButton()
         self.button.setAutoDefault(False)
-        self.button.setToolTip("Space. Begins or ends the recording; it ends by itself when the time is over.")
+        self.button.setToolTip(tr("Space. Begins or ends the recording; it ends by itself when the time is over."))
         self.button.clicked.connect(self._press)
-        words = QLabel(note)
+        words = QLabel(tr(note))
         words.setWordWrap(True)
         words.setProperty("muted", True)
         self.column.addWidget(self.button)
@@ -196,7 +201,7 @@ class MovementPage(Page):
     def show_view(self, view: StepView) -> None:
         """The button's word; ask the engine what the step wants."""
         phase = self.movement.phase
-        self.button.setText(_LABELS[phase])
+        self.button.setText(tr(_LABELS[phase]))
         self.button.setEnabled(phase in ("waiting", "recording", "recorded"))
         request = self.movement.request()
         if request is not None:
@@ -232,7 +237,7 @@ class Movements:
 
     def __init__(self, context: WizardContext) -> None:
         if context.listen is None:
-            raise EngineError("this window cannot hear the hand; open the wizard from the main window.")
+            raise EngineError(tr("this window cannot hear the hand; open the wizard from the main window."))
         self.states = StateFeed(context.listen)
         self._connect = context.connect
         self.folder = Path(tempfile.mkdtemp(prefix="rhot-wizard-"))

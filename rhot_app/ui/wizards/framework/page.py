@@ -34,6 +34,7 @@ from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.common.theme import CELL_PADDING_PX, app_font
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.models.proposal import ways_back
 from rhot_app.ui.models.words import GRADES
@@ -91,9 +92,9 @@ class AcceptPage(Page):
         self._rows: tuple[Row, ...] | None = None
         self.table = RowTable(scheme, heads)
         self.centre = self.table
-        self.restore_button = QPushButton("Restore the old one")
+        self.restore_button = QPushButton(tr("Restore the old one"))
         self.restore_button.setAutoDefault(False)
-        self.restore_button.setToolTip("Brings back what was there before.")
+        self.restore_button.setToolTip(tr("Brings back what was there before."))
         self.restore_button.clicked.connect(self.restore_asked)
         self.note = QLabel()
         self.note.setWordWrap(True)
@@ -112,8 +113,8 @@ class AcceptPage(Page):
         if rows != self._rows:
             self._rows = rows
             self.table.show_records(rows)
-        self.note.setText(f"Nothing was saved so far. {ways_back(self.accept.changes)}" if proposal is not None else
-                          "")
+        self.note.setText(tr("Nothing was saved so far. {ways_back}", ways_back=ways_back(self.accept.changes))
+                          if proposal is not None else "")
         self.note.setVisible(self.accept.state == "proposed")
         self.restore_button.setVisible(self.accept.restorable)
 
@@ -344,7 +345,8 @@ class VerdictView(QScrollArea):
         for finding in verdict.findings:
             look = GRADES[finding.grade]
             self._add_row(grid, look.shape, look.tone, _label(_finding_text(finding)), 16)
-        self.setAccessibleName(f"Verdict: {GRADES[verdict.grade].word}. {verdict.sentence}")
+        self.setAccessibleName(tr("Verdict: {word}. {sentence}", word=GRADES[verdict.grade].word,
+                                  sentence=verdict.sentence))
         return grid
 
     def _add_row(self, grid: QGridLayout, shape: str, tone: str, label: QLabel, size: int) -> None:

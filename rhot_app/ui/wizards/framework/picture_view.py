@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from rhot_app.ui.backend.feed import LiveFeed, Picture
 from rhot_app.ui.common.shapes import paint_tag
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.drawing import Callout, Overlay
 from rhot_app.ui.wizards.framework.picture_painter import FramePlacement, fit, paint_overlay
@@ -48,7 +49,7 @@ class PictureView(QWidget):
         self._drag: tuple[QPointF, QPointF] | None = None
         self.setMinimumSize(160, 120)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName(f"Live picture of camera {name}")
+        self.setAccessibleName(tr("Live picture of camera {name}", name=name))
 
     def sizeHint(self) -> QSize:  # noqa: N802
         """Four by three."""
@@ -121,7 +122,7 @@ class PictureView(QWidget):
             painter.setPen(QColor(self._scheme.text))
             painter.drawText(place.target.adjusted(24, 24, -24, -24),
                              Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap,
-                             self._problem or "waiting for the first picture")
+                             self._problem or tr("waiting for the first picture"))
         self._paint_frames(painter, place)
         painter.end()
 
@@ -132,7 +133,7 @@ class PictureView(QWidget):
         """Small beside a large one, or as large as there is room."""
         self.small = small
         self.setMaximumSize(*(_SMALL_PX if small else (_ANY_PX, _ANY_PX)))
-        self.setToolTip("A click shows this picture large." if small else "")
+        self.setToolTip(tr("A click shows this picture large.") if small else "")
 
     def _paint_frames(self, painter: QPainter, place: FramePlacement) -> None:
         painter.setBrush(Qt.BrushStyle.NoBrush)

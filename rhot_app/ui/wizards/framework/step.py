@@ -18,6 +18,7 @@ from rhot_app.calibration.report import Report
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.charts import Chart
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.proposal import changes_of, restore_all, use_all
 from rhot_app.ui.wizards.framework.drawing import Overlay
 
@@ -69,7 +70,7 @@ class StepView:
     def __post_init__(self) -> None:
         if self.done and self.verdict is not None and not self.verdict.acceptable:
             object.__setattr__(self, "done", False)
-            object.__setattr__(self, "sentence", "Mend what the verdict says.")
+            object.__setattr__(self, "sentence", tr("Mend what the verdict says."))
 
     @property
     def may_go_on(self) -> bool:
@@ -149,11 +150,11 @@ class SolveStep(ChartedStep):
     `result` is what came of it, `report` what the calibration says of it. Subclasses show it over pictures.
     """
 
-    advice = "Look at the result, then go on."
+    advice = tr_noop("Look at the result, then go on.")
 
     def __init__(self, calibration: Calibration, now: InForce,
-                 observations: Callable[[], tuple[Any, ...] | Done | None], working: str, title: str = "Result",
-                 missing: str = "Go back: nothing was recorded yet.") -> None:
+                 observations: Callable[[], tuple[Any, ...] | Done | None], working: str,
+                 title: str = tr_noop("Result"), missing: str = tr_noop("Go back: nothing was recorded yet.")) -> None:
         """`observations` are the arguments of ``calibration.solve``, None while something is `missing`; equal ones are
         not solved again. `working` is said meanwhile."""
         self.title = title
@@ -220,10 +221,10 @@ class SolveStep(ChartedStep):
     def view(self) -> StepView:
         """The verdict, once there is one."""
         if self.report is None:
-            return StepView(self._missing if self._work is None else "It did not work out." if self._problem else
-                            "One moment.", hint=self._problem)
+            return StepView(self._missing if self._work is None else tr("It did not work out.") if self._problem
+                            else tr("One moment."), hint=self._problem)
         verdict = self.report.verdict
-        return StepView(self.advice if verdict.acceptable else "Read what is wrong, then go back.",
+        return StepView(self.advice if verdict.acceptable else tr("Read what is wrong, then go back."),
                         done=verdict.acceptable, verdict=verdict)
 
 
@@ -236,11 +237,11 @@ class AcceptStep(Step):
     """Shows what `propose` gives when the step is entered. `apply` and `take_back` wait: call them in a worker, between
     `begin` and `finish`."""
 
-    title = "Before and after"
-    use_label = "Use this calibration"
+    title = tr_noop("Before and after")
+    use_label = tr_noop("Use this calibration")
 
     def __init__(self, propose: Callable[[], Proposal | None], path: Path | None,
-                 missing: str = "There is no result yet.") -> None:
+                 missing: str = tr_noop("There is no result yet.")) -> None:
         """`path` is the rig's file. `missing` is shown while `propose` gives None."""
         self._propose = propose
         self._path = path
@@ -302,11 +303,11 @@ class AcceptStep(Step):
         if self.proposal is None:
             return self._missing
         if self.state == "under way":
-            return "One moment."
+            return tr("One moment.")
         if self.state == "used":
-            return "It is in use and saved."
+            return tr("It is in use and saved.")
         if self.state == "restored":
-            return "The old one is back."
+            return tr("The old one is back.")
         if not self.proposal.verdict.acceptable:
-            return "This must not be used: go back and mend what the verdict says."
-        return "Compare, then use this calibration or go back."
+            return tr("This must not be used: go back and mend what the verdict says.")
+        return tr("Compare, then use this calibration or go back.")

@@ -12,6 +12,7 @@ from rhot_app.calibration.verdict import verdict_from
 from rhot_app.errors import RhotError
 from rhot_app.ui.backend.contract import Asker
 from rhot_app.ui.backend.reader import Reader
+from rhot_app.ui.language import tr
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
 from rhot_app.ui.wizards.framework.page import Page
 from rhot_app.ui.wizards.framework.step import Step, StepView
@@ -84,7 +85,7 @@ class MoveStep(Step):
         answer, problem = self._feed.answer, self._feed.problem
         if not answer["known"]:
             waited_s = self._clock() - self._begun_s
-            return StepView(self._what.sentence if waited_s > ASK_S else "One moment.", hint=problem)
+            return StepView(self._what.sentence if waited_s > ASK_S else tr("One moment."), hint=problem)
         verdict = verdict_from(answer)
         said = self._what.say(answer, verdict)
         return StepView(said.sentence, done=said.done, verdict=verdict, hint=problem or said.hint)

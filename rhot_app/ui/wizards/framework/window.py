@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QWidget
 from rhot_app.ui.backend.feed import LiveFeed, Picture
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.tool_window import ToolWindow
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.frame import WizardFrame
 from rhot_app.ui.wizards.framework.page import AcceptPage
@@ -27,14 +28,14 @@ class WizardWindow(ToolWindow):
     """Shows one `Definition`, as large as the window that it stands over. `rig_used` gives the rig in force after
     "Use this calibration" and after a restore; `used` the proposal, and whether it is in force now."""
 
-    losing = ("Close without using this calibration? What was captured here is lost; the calibration in force stays as "
-              "it is.")
+    losing = tr_noop("Close without using this calibration? What was captured here is lost; the calibration in force "
+                      "stays as it is.")
     rig_used = Signal(object)
     used = Signal(object, bool)
 
     def __init__(self, definition: Definition, context: WizardContext, parent: QWidget | None = None) -> None:
         title = context.calibration.title
-        super().__init__(title, "calibration", parent, section=title)
+        super().__init__(tr(title), "calibration", parent, section=title)
         self.definition = definition
         self._context = context
         self.feed = LiveFeed({node.name: node.node_id for node in context.rig.nodes if not node.text_datagrams},

@@ -10,10 +10,11 @@ from PySide6.QtCore import QObject, Signal
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.words import Remaining
 from rhot_app.ui.wizards.framework.step import Step, Task
 
-CANCELLED = "Stopped. Go on with Begin again, or go back."
+CANCELLED = tr_noop("Stopped. Go on with Begin again, or go back.")
 
 
 class Work(QObject):
@@ -67,7 +68,7 @@ class Work(QObject):
             self.solver.stop()
             self.halted = True
             if self._step is not None:
-                self._step.take_failure(CANCELLED)
+                self._step.take_failure(tr(CANCELLED))
             self.changed.emit()
 
     def leave(self) -> None:
@@ -81,7 +82,7 @@ class Work(QObject):
         self.solver.stop()
 
     def _start(self, step: Step, task: Task) -> None:
-        self._step, self.task, self.text = step, task, task.title
+        self._step, self.task, self.text = step, task, tr(task.title)
         self._remaining = Remaining(time.monotonic())
         self._job = Job(lambda progress: self._compute(task, progress), self._on_done, self._on_failed, self._on_report,
                         self).start()
@@ -92,8 +93,8 @@ class Work(QObject):
             return self.solver.run(task.function, task.arguments, progress.report)
         except StoppedError as exc:
             if progress.cancelled:
-                raise CancelledError("Cancelled.") from exc
-            raise CalibrationError("The work was stopped.") from exc
+                raise CancelledError(tr("Cancelled.")) from exc
+            raise CalibrationError(tr("The work was stopped.")) from exc
 
     def _on_report(self, text: str, fraction: float) -> None:
         self.text = text
