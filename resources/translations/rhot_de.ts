@@ -5035,5 +5035,1889 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <source>The landmarks show bones that differ from the rig&apos;s hand by {apart:.0f} mm (rms). With them the joints are more accurate.</source>
         <translation>Die Landmarken zeigen Knochen, die von der Hand des Rigs um {apart:.0f} mm (rms) abweichen. Mit ihnen sind die Gelenke genauer.</translation>
     </message>
+    <message>
+        <source>this window cannot hear the hand; open the wizard from the main window.</source>
+        <translation>dieses Fenster hört die Hand nicht; den Assistenten aus dem Hauptfenster öffnen.</translation>
+    </message>
+    <message>
+        <source>Aligning both trackers …</source>
+        <translation>Beide Tracker werden ausgerichtet …</translation>
+    </message>
+    <message>
+        <source>Record a movement of both first.</source>
+        <translation>Zuerst eine Bewegung beider aufnehmen.</translation>
+    </message>
+    <message>
+        <source>A Vive tracker, by SteamVR on this machine.</source>
+        <translation>Ein Vive-Tracker, über SteamVR auf diesem Rechner.</translation>
+    </message>
+    <message>
+        <source>A Vive tracker, by survive-cli on this machine.</source>
+        <translation>Ein Vive-Tracker, über survive-cli auf diesem Rechner.</translation>
+    </message>
+    <message>
+        <source>Program</source>
+        <translation>Programm</translation>
+    </message>
+    <message>
+        <source>A program that prints a line for each pose.</source>
+        <translation>Ein Programm, das für jede Pose eine Zeile ausgibt.</translation>
+    </message>
+    <message>
+        <source>program and arguments</source>
+        <translation>Programm und Argumente</translation>
+    </message>
+    <message>
+        <source>Lines that a program sends to this port.</source>
+        <translation>Zeilen, die ein Programm an diesen Port sendet.</translation>
+    </message>
+    <message>
+        <source>A program that serves lines.</source>
+        <translation>Ein Programm, das Zeilen bereitstellt.</translation>
+    </message>
+    <message>
+        <source>A tracker on the simulated index fingertip.</source>
+        <translation>Ein Tracker an der simulierten Zeigefingerspitze.</translation>
+    </message>
+    <message>
+        <source>Choose the other tracker, switch it on, then connect.</source>
+        <translation>Den anderen Tracker auswählen, einschalten und dann verbinden.</translation>
+    </message>
+    <message>
+        <source>{least_hz:.0f} or more a second</source>
+        <translation>{least_hz:.0f} oder mehr pro Sekunde</translation>
+    </message>
+    <message>
+        <source>{rate_hz:.0f} poses a second. Go on.</source>
+        <translation>{rate_hz:.0f} Posen pro Sekunde. Weiter.</translation>
+    </message>
+    <message>
+        <source>Waiting for poses.</source>
+        <translation>Warten auf Posen.</translation>
+    </message>
+    <message>
+        <source>Good, go on.</source>
+        <translation>Gut, weiter so.</translation>
+    </message>
+    <message>
+        <source>Move both</source>
+        <translation>Beide bewegen</translation>
+    </message>
+    <message>
+        <source>Tie the tracker to the finger. Press Record, then move and turn both, irregularly.</source>
+        <translation>Den Tracker am Finger befestigen. Aufnehmen drücken, dann beide unregelmäßig bewegen und drehen.</translation>
+    </message>
+    <message>
+        <source>Moves and turns.</source>
+        <translation>Bewegt und dreht sich.</translation>
+    </message>
+    <message>
+        <source>The tracker gives no poses. Go back and connect it.</source>
+        <translation>Der Tracker liefert keine Posen. Zurückgehen und ihn verbinden.</translation>
+    </message>
+    <message>
+        <source>The marker {markers} is not seen by two cameras. Hold it before them, or choose another one.</source>
+        <translation>Der Marker {markers} wird nicht von zwei Kameras gesehen. Ihn vor sie halten oder einen anderen wählen.</translation>
+    </message>
+    <message>
+        <source>of the tracker about two axes, {degrees:.0f} degrees rms</source>
+        <translation>des Trackers um zwei Achsen, {degrees:.0f} Grad Effektivwert</translation>
+    </message>
+    <message>
+        <source>of the finger across its longest way, {enough_m:.0f} mm rms</source>
+        <translation>des Fingers über seinen längsten Weg, {enough_m:.0f} mm Effektivwert</translation>
+    </message>
+    <message>
+        <source>of the finger, {enough_m_s:.0f} mm/s rms</source>
+        <translation>des Fingers, {enough_m_s:.0f} mm/s Effektivwert</translation>
+    </message>
+    <message>
+        <source>Keep the marker in view.</source>
+        <translation>Den Marker im Blick halten.</translation>
+    </message>
+    <message>
+        <source>Turn the tracker while you move it.</source>
+        <translation>Den Tracker beim Bewegen drehen.</translation>
+    </message>
+    <message>
+        <source>Turn it about a second axis, too.</source>
+        <translation>Ihn auch um eine zweite Achse drehen.</translation>
+    </message>
+    <message>
+        <source>Move farther: up and down, left and right, near and far.</source>
+        <translation>Weiter bewegen: auf und ab, links und rechts, nah und fern.</translation>
+    </message>
+    <message>
+        <source>Move faster.</source>
+        <translation>Schneller bewegen.</translation>
+    </message>
+    <message>
+        <source>the only one</source>
+        <translation>der einzige</translation>
+    </message>
+    <message>
+        <source>Serial number, name or role. Empty: the only one.</source>
+        <translation>Seriennummer, Name oder Rolle. Leer: der einzige.</translation>
+    </message>
+    <message>
+        <source>Connect</source>
+        <translation>Verbinden</translation>
+    </message>
+    <message>
+        <source>Source</source>
+        <translation>Quelle</translation>
+    </message>
+    <message>
+        <source>Where</source>
+        <translation>Wo</translation>
+    </message>
+    <message>
+        <source>{name}: {rate_hz:.0f} poses a second</source>
+        <translation>{name}: {rate_hz:.0f} Posen pro Sekunde</translation>
+    </message>
+    <message>
+        <source>What both show is kept until this window closes.</source>
+        <translation>Was beide zeigen, bleibt erhalten, bis dieses Fenster schließt.</translation>
+    </message>
+    <message>
+        <source>The marker that the tracker is tied to.</source>
+        <translation>Der Marker, an dem der Tracker befestigt ist.</translation>
+    </message>
+    <message>
+        <source>Marker</source>
+        <translation>Marker</translation>
+    </message>
+    <message>
+        <source>Move freely</source>
+        <translation>Frei bewegen</translation>
+    </message>
+    <message>
+        <source>Press Record, then bend and stretch every finger and turn the hand.</source>
+        <translation>Aufnehmen drücken, dann jeden Finger beugen und strecken und die Hand drehen.</translation>
+    </message>
+    <message>
+        <source>Moves every joint: all of them within the minute.</source>
+        <translation>Bewegt jedes Gelenk: alle innerhalb einer Minute.</translation>
+    </message>
+    <message>
+        <source>Press Next: the bones were entered.</source>
+        <translation>Weiter drücken: Die Knochen wurden eingegeben.</translation>
+    </message>
+    <message>
+        <source>Fitting the hand …</source>
+        <translation>Die Hand wird angepasst …</translation>
+    </message>
+    <message>
+        <source>Record the movement first.</source>
+        <translation>Zuerst die Bewegung aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Your hand</source>
+        <translation>Die Hand</translation>
+    </message>
+    <message>
+        <source>Mend what was entered.</source>
+        <translation>Berichtigen, was eingegeben wurde.</translation>
+    </message>
+    <message>
+        <source>Press Next to measure by movement.</source>
+        <translation>Weiter drücken, um durch Bewegung zu vermessen.</translation>
+    </message>
+    <message>
+        <source>Or enter bones that you have measured with a ruler, joint to joint.</source>
+        <translation>Oder Knochen eingeben, die mit dem Lineal gemessen wurden, von Gelenk zu Gelenk.</translation>
+    </message>
+    <message>
+        <source>Press Next: the bones are as entered.</source>
+        <translation>Weiter drücken: Die Knochen sind wie eingegeben.</translation>
+    </message>
+    <message>
+        <source>bent and stretched {sweeps} times; how far shows when the hand is fitted</source>
+        <translation>{sweeps}-mal gebeugt und gestreckt; wie weit, zeigt sich beim Anpassen der Hand</translation>
+    </message>
+    <message>
+        <source>in sight</source>
+        <translation>im Blick</translation>
+    </message>
+    <message>
+        <source>of {least_s:.0f} s in which the cameras see the markers together</source>
+        <translation>von {least_s:.0f} s, in denen die Kameras die Marker gemeinsam sehen</translation>
+    </message>
+    <message>
+        <source>Show the hand to both cameras.</source>
+        <translation>Die Hand beiden Kameras zeigen.</translation>
+    </message>
+    <message>
+        <source>Bend and stretch every finger.</source>
+        <translation>Jeden Finger beugen und strecken.</translation>
+    </message>
+    <message>
+        <source>Right hand</source>
+        <translation>Rechte Hand</translation>
+    </message>
+    <message>
+        <source>Left hand</source>
+        <translation>Linke Hand</translation>
+    </message>
+    <message>
+        <source>Which hand wears the markers.</source>
+        <translation>Welche Hand die Marker trägt.</translation>
+    </message>
+    <message>
+        <source>Ctrl+Z. What was entered last.</source>
+        <translation>Strg+Z. Die letzte Eingabe.</translation>
+    </message>
+    <message>
+        <source>Most people leave this page as it is: a minute of movement shows the lengths, and how well. A ruler helps where too few markers are worn.</source>
+        <translation>Die meisten lassen diese Seite, wie sie ist: Eine Minute Bewegung zeigt die Längen und wie gut sie sind. Ein Lineal hilft, wo zu wenige Marker getragen werden.</translation>
+    </message>
+    <message>
+        <source>first bone</source>
+        <translation>erster Knochen</translation>
+    </message>
+    <message>
+        <source>second bone</source>
+        <translation>zweiter Knochen</translation>
+    </message>
+    <message>
+        <source>last bone, to the tip</source>
+        <translation>letzter Knochen, bis zur Spitze</translation>
+    </message>
+    <message>
+        <source>{name}: from the middle of one joint to that of the next, finger bent. {usual:.0f} mm in the hand now in use.</source>
+        <translation>{name}: von der Mitte eines Gelenks zur Mitte des nächsten, bei gebeugtem Finger. {usual:.0f} mm bei der jetzt benutzten Hand.</translation>
+    </message>
+    <message>
+        <source>From the wrist over the finger&apos;s root to its stretched tip.</source>
+        <translation>Vom Handgelenk über die Fingerwurzel zur gestreckten Spitze.</translation>
+    </message>
+    <message>
+        <source>Solid: the markers show it. Translucent: they show it in part. Hatched: they do not; the length is what is usual for a hand of this size.</source>
+        <translation>Voll: Die Marker zeigen es. Durchscheinend: Sie zeigen es zum Teil. Schraffiert: Sie zeigen es nicht; die Länge ist die übliche für eine Hand dieser Größe.</translation>
+    </message>
+    <message>
+        <source>Reach: </source>
+        <translation>Reichweite: </translation>
+    </message>
+    <message>
+        <source>No picture shows these settings yet, or they cannot be used: go back.</source>
+        <translation>Noch zeigt kein Bild diese Einstellungen, oder sie sind nicht brauchbar: zurückgehen.</translation>
+    </message>
+    <message>
+        <source>Whose settings are turned. Both at once keeps equal cameras equal.</source>
+        <translation>Wessen Einstellungen gedreht werden. Beide zugleich hält gleiche Kameras gleich.</translation>
+    </message>
+    <message>
+        <source>All cameras</source>
+        <translation>Alle Kameras</translation>
+    </message>
+    <message>
+        <source>Balance on grey</source>
+        <translation>Auf Grau abgleichen</translation>
+    </message>
+    <message>
+        <source>Drag over something grey or white in a picture first, a sheet of paper for instance. Press again until nothing changes.</source>
+        <translation>Zuerst in einem Bild über etwas Graues oder Weißes ziehen, etwa ein Blatt Papier. So oft drücken, bis sich nichts mehr ändert.</translation>
+    </message>
+    <message>
+        <source>Ctrl+Z. The last change back.</source>
+        <translation>Strg+Z. Die letzte Änderung zurück.</translation>
+    </message>
+    <message>
+        <source>{name} (they differ)</source>
+        <translation>{name} (verschieden)</translation>
+    </message>
+    <message>
+        <source>Exposure time</source>
+        <translation>Belichtungszeit</translation>
+    </message>
+    <message>
+        <source>How long each row collects light. Short keeps moving markers sharp; a multiple of the mains&apos; half period (10 ms at 50 Hz, 8.33 ms at 60 Hz) keeps lamps from flickering.</source>
+        <translation>Wie lange jede Zeile Licht sammelt. Kurz hält bewegte Marker scharf; ein Vielfaches der halben Netzperiode (10 ms bei 50 Hz, 8.33 ms bei 60 Hz) verhindert das Flackern von Lampen.</translation>
+    </message>
+    <message>
+        <source>Gain</source>
+        <translation>Verstärkung</translation>
+    </message>
+    <message>
+        <source>Amplifies the signal, and its noise. Raise it only when light and exposure cannot be.</source>
+        <translation>Verstärkt das Signal und sein Rauschen. Nur erhöhen, wenn es mit Licht und Belichtung nicht geht.</translation>
+    </message>
+    <message>
+        <source>Brightness</source>
+        <translation>Helligkeit</translation>
+    </message>
+    <message>
+        <source>Added to every pixel. 0 leaves it; it brings no light, so change it last.</source>
+        <translation>Wird zu jedem Pixel addiert. 0 lässt es; bringt kein Licht, daher zuletzt ändern.</translation>
+    </message>
+    <message>
+        <source>Contrast</source>
+        <translation>Kontrast</translation>
+    </message>
+    <message>
+        <source>Spreads the grey levels about the middle; 1 leaves them.</source>
+        <translation>Spreizt die Graustufen um die Mitte; 1 lässt sie.</translation>
+    </message>
+    <message>
+        <source>Saturation</source>
+        <translation>Sättigung</translation>
+    </message>
+    <message>
+        <source>How strong colours are; 1 leaves them, more sets the markers apart from grey.</source>
+        <translation>Wie kräftig Farben sind; 1 lässt sie, mehr hebt die Marker von Grau ab.</translation>
+    </message>
+    <message>
+        <source>Red gain</source>
+        <translation>Rotverstärkung</translation>
+    </message>
+    <message>
+        <source>White balance: raise it when white looks green or blue.</source>
+        <translation>Weißabgleich: erhöhen, wenn Weiß grün oder blau aussieht.</translation>
+    </message>
+    <message>
+        <source>Blue gain</source>
+        <translation>Blauverstärkung</translation>
+    </message>
+    <message>
+        <source>White balance: raise it when white looks yellow or red.</source>
+        <translation>Weißabgleich: erhöhen, wenn Weiß gelb oder rot aussieht.</translation>
+    </message>
+    <message>
+        <source>left to the camera</source>
+        <translation>der Kamera überlassen</translation>
+    </message>
+    <message>
+        <source>No picture comes from {name}.</source>
+        <translation>Von {name} kommt kein Bild.</translation>
+    </message>
+    <message>
+        <source>Look at the Nodes panel.</source>
+        <translation>Das Feld Knoten ansehen.</translation>
+    </message>
+    <message>
+        <source>No camera answers.</source>
+        <translation>Keine Kamera antwortet.</translation>
+    </message>
+    <message>
+        <source>Look at the Nodes panel: its sentence says what is wrong.</source>
+        <translation>Das Feld Knoten ansehen: Seine Meldung sagt, was nicht stimmt.</translation>
+    </message>
+    <message>
+        <source>The pictures are good: press Next.</source>
+        <translation>Die Bilder sind gut: Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>Show the hand with its markers, and turn the knobs until the verdict is good.</source>
+        <translation>Die Hand mit ihren Markern zeigen und an den Reglern drehen, bis das Urteil gut ist.</translation>
+    </message>
+    <message>
+        <source>{partition} The settings in force are no better.</source>
+        <translation>{partition} Die geltenden Einstellungen sind nicht besser.</translation>
+    </message>
+    <message>
+        <source>Palm to the cameras</source>
+        <translation>Handfläche zu den Kameras</translation>
+    </message>
+    <message>
+        <source>Back to the cameras</source>
+        <translation>Handrücken zu den Kameras</translation>
+    </message>
+    <message>
+        <source>A board, no hand</source>
+        <translation>Ein Brett, keine Hand</translation>
+    </message>
+    <message>
+        <source>Hold still.</source>
+        <translation>Still halten.</translation>
+    </message>
+    <message>
+        <source>Go on.</source>
+        <translation>Weiter.</translation>
+    </message>
+    <message>
+        <source>Measuring the recordings …</source>
+        <translation>Die Aufnahmen werden vermessen …</translation>
+    </message>
+    <message>
+        <source>Record a step first.</source>
+        <translation>Zuerst einen Schritt aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Rest your hand, palm to the cameras, fingers spread; or rest a board. Then press Record.</source>
+        <translation>Die Hand ruhen lassen, Handfläche zu den Kameras, Finger gespreizt; oder ein Brett hinstellen. Dann Aufnehmen drücken.</translation>
+    </message>
+    <message>
+        <source>Hold one marker still, read the ruler, type it, press Record. Eight distances, near to far.</source>
+        <translation>Einen Marker still halten, am Lineal ablesen, eintippen, Aufnehmen drücken. Acht Abstände, von nah nach fern.</translation>
+    </message>
+    <message>
+        <source>Press Record, then move a rod with two markers slowly through the whole volume, turning it every way.</source>
+        <translation>Aufnehmen drücken, dann einen Stab mit zwei Markern langsam durch den ganzen Raum bewegen und in alle Richtungen drehen.</translation>
+    </message>
+    <message>
+        <source>Turn the cameras to this screen, darken the room, press Record: the patch flashes for 20 seconds.</source>
+        <translation>Die Kameras auf diesen Bildschirm richten, den Raum abdunkeln, Aufnehmen drücken: Das Feld blinkt 20 Sekunden lang.</translation>
+    </message>
+    <message>
+        <source>Hang the rod from a string. When it is still, press Record.</source>
+        <translation>Den Stab an eine Schnur hängen. Wenn er still hängt, Aufnehmen drücken.</translation>
+    </message>
+    <message>
+        <source>Still</source>
+        <translation>Ruhe</translation>
+    </message>
+    <message>
+        <source>Ruler</source>
+        <translation>Lineal</translation>
+    </message>
+    <message>
+        <source>Rod</source>
+        <translation>Stab</translation>
+    </message>
+    <message>
+        <source>Flash</source>
+        <translation>Blinken</translation>
+    </message>
+    <message>
+        <source>Plumb line</source>
+        <translation>Lot</translation>
+    </message>
+    <message>
+        <source>{rows} distances. Type the next one and press Record, or go on.</source>
+        <translation>{rows} Abstände. Den nächsten eintippen und Aufnehmen drücken, oder weiter.</translation>
+    </message>
+    <message>
+        <source>Keep</source>
+        <translation>Behalten</translation>
+    </message>
+    <message>
+        <source>Write the certificate</source>
+        <translation>Zertifikat schreiben</translation>
+    </message>
+    <message>
+        <source>It is written.</source>
+        <translation>Es ist geschrieben.</translation>
+    </message>
+    <message>
+        <source>It is deleted.</source>
+        <translation>Es ist gelöscht.</translation>
+    </message>
+    <message>
+        <source>Write the certificate, or go back and record a step again.</source>
+        <translation>Das Zertifikat schreiben oder zurückgehen und einen Schritt noch einmal aufnehmen.</translation>
+    </message>
+    <message>
+        <source>A mirrored rig tracks smoothly and is wrong; this tells.</source>
+        <translation>Ein spiegelverkehrtes Rig verfolgt flüssig und falsch; dies zeigt es.</translation>
+    </message>
+    <message>
+        <source>The marker that is held along the ruler.</source>
+        <translation>Der Marker, der am Lineal entlang gehalten wird.</translation>
+    </message>
+    <message>
+        <source>From the line between both lenses straight ahead, by a ruler.</source>
+        <translation>Von der Linie zwischen beiden Objektiven geradeaus, mit dem Lineal.</translation>
+    </message>
+    <message>
+        <source>Distance</source>
+        <translation>Abstand</translation>
+    </message>
+    <message>
+        <source>No distance yet.</source>
+        <translation>Noch kein Abstand.</translation>
+    </message>
+    <message>
+        <source>From the centre of one marker to the centre of the other, by a ruler.</source>
+        <translation>Von der Mitte des einen Markers zur Mitte des anderen, mit dem Lineal.</translation>
+    </message>
+    <message>
+        <source>The end that is above when the rod hangs.</source>
+        <translation>Das Ende, das oben ist, wenn der Stab hängt.</translation>
+    </message>
+    <message>
+        <source>The other end.</source>
+        <translation>Das andere Ende.</translation>
+    </message>
+    <message>
+        <source>Upper marker</source>
+        <translation>Oberer Marker</translation>
+    </message>
+    <message>
+        <source>Lower marker</source>
+        <translation>Unterer Marker</translation>
+    </message>
+    <message>
+        <source>The colour of the patch: one that nothing else in the pictures has.</source>
+        <translation>Die Farbe des Feldes: eine, die sonst nichts in den Bildern hat.</translation>
+    </message>
+    <message>
+        <source>Colour of</source>
+        <translation>Farbe von</translation>
+    </message>
+    <message>
+        <source>flashing patch</source>
+        <translation>blinkendes Feld</translation>
+    </message>
+    <message>
+        <source>Delete it again</source>
+        <translation>Wieder löschen</translation>
+    </message>
+    <message>
+        <source>Removes the folder that was written.</source>
+        <translation>Entfernt den geschriebenen Ordner.</translation>
+    </message>
+    <message>
+        <source>Pick the markers&apos; colours first.</source>
+        <translation>Zuerst die Farben der Marker aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Hue, either way</source>
+        <translation>Farbton, zu beiden Seiten</translation>
+    </message>
+    <message>
+        <source>How far a pixel&apos;s hue may be from the marker&apos;s. Wider bears more shade and other lamps; narrower takes less of what has a similar colour.</source>
+        <translation>Wie weit der Farbton eines Pixels von dem des Markers abweichen darf. Weiter verträgt mehr Schatten und andere Lampen; enger nimmt weniger von ähnlichen Farben.</translation>
+    </message>
+    <message>
+        <source>Least colour</source>
+        <translation>Kleinste Buntheit</translation>
+    </message>
+    <message>
+        <source>How far from grey a pixel must be, in grey levels of chroma. Less bears deeper shade; more leaves out pale things.</source>
+        <translation>Wie weit ein Pixel von Grau entfernt sein muss, in Graustufen der Buntheit. Weniger verträgt tieferen Schatten; mehr lässt blasse Dinge aus.</translation>
+    </message>
+    <message>
+        <source>Darkest</source>
+        <translation>Dunkelstes</translation>
+    </message>
+    <message>
+        <source>Pixels darker than this are noise.</source>
+        <translation>Dunklere Pixel sind Rauschen.</translation>
+    </message>
+    <message>
+        <source>Brightest</source>
+        <translation>Hellstes</translation>
+    </message>
+    <message>
+        <source>Pixels brighter than this are burnt highlights.</source>
+        <translation>Hellere Pixel sind ausgebrannte Glanzlichter.</translation>
+    </message>
+    <message>
+        <source>Learning the colours …</source>
+        <translation>Die Farben werden gelernt …</translation>
+    </message>
+    <message>
+        <source>Check the mask</source>
+        <translation>Maske prüfen</translation>
+    </message>
+    <message>
+        <source>Go back and pick a colour.</source>
+        <translation>Zurückgehen und eine Farbe aufnehmen.</translation>
+    </message>
+    <message>
+        <source>{chosen} is found by {sum} of {found} cameras.</source>
+        <translation>{chosen} wird von {sum} von {found} Kameras gefunden.</translation>
+    </message>
+    <message>
+        <source>Since the colours were picked: {sentence}</source>
+        <translation>Seit die Farben aufgenommen wurden: {sentence}</translation>
+    </message>
+    <message>
+        <source>The mask must fit the markers.</source>
+        <translation>Die Maske muss auf die Marker passen.</translation>
+    </message>
+    <message>
+        <source>As learnt</source>
+        <translation>Wie gelernt</translation>
+    </message>
+    <message>
+        <source>The chosen marker&apos;s bounds as they were learnt from the samples.</source>
+        <translation>Die Grenzen des gewählten Markers, wie sie aus den Proben gelernt wurden.</translation>
+    </message>
+    <message>
+        <source>{text}, by hand</source>
+        <translation>{text}, von Hand</translation>
+    </message>
+    <message>
+        <source>doubtful</source>
+        <translation>zweifelhaft</translation>
+    </message>
+    <message>
+        <source>not found</source>
+        <translation>nicht gefunden</translation>
+    </message>
+    <message>
+        <source>Mask of all markers</source>
+        <translation>Maske aller Marker</translation>
+    </message>
+    <message>
+        <source>Mask of the chosen marker</source>
+        <translation>Maske des gewählten Markers</translation>
+    </message>
+    <message>
+        <source>Picture without mask</source>
+        <translation>Bild ohne Maske</translation>
+    </message>
+    <message>
+        <source>The mask is what the detector really takes for each marker, pixel by pixel, in this light.</source>
+        <translation>Die Maske ist, was der Detektor in diesem Licht wirklich für jeden Marker hält, Pixel für Pixel.</translation>
+    </message>
+    <message>
+        <source>Pick the colours</source>
+        <translation>Farben aufnehmen</translation>
+    </message>
+    <message>
+        <source>as skin</source>
+        <translation>als Haut</translation>
+    </message>
+    <message>
+        <source>as {other}</source>
+        <translation>als {other}</translation>
+    </message>
+    <message>
+        <source>was {other}&apos;s</source>
+        <translation>war {other}</translation>
+    </message>
+    <message>
+        <source>Click the right paint; Ctrl+Z takes the last click back.</source>
+        <translation>Die richtige Farbe anklicken; Strg+Z nimmt den letzten Klick zurück.</translation>
+    </message>
+    <message>
+        <source>{name} has the colour of skin: {shown}.</source>
+        <translation>{name} hat die Farbe von Haut: {shown}.</translation>
+    </message>
+    <message>
+        <source>{first} and {second} have one colour: their hues are {apart:.0f}° apart.</source>
+        <translation>{first} und {second} haben eine Farbe: Ihre Farbtöne liegen {apart:.0f}° auseinander.</translation>
+    </message>
+    <message>
+        <source>If the hand does not wear them so, click these again.</source>
+        <translation>Wenn die Hand sie nicht so trägt, diese noch einmal anklicken.</translation>
+    </message>
+    <message>
+        <source>look at {names} again.</source>
+        <translation>noch einmal ansehen: {names}.</translation>
+    </message>
+    <message>
+        <source>{names} of {ids} markers</source>
+        <translation>{names} von {ids} Markern</translation>
+    </message>
+    <message>
+        <source>seen moving</source>
+        <translation>bewegt gesehen</translation>
+    </message>
+    <message>
+        <source>places and angles at which the markers were seen so far</source>
+        <translation>Orte und Winkel, an denen die Marker bisher gesehen wurden</translation>
+    </message>
+    <message>
+        <source>Click {paint} in the held picture.</source>
+        <translation>Im angehaltenen Bild anklicken: {paint}.</translation>
+    </message>
+    <message>
+        <source>Click {paint}, or drag over it.</source>
+        <translation>Anklicken oder darüberziehen: {paint}.</translation>
+    </message>
+    <message>
+        <source>Choose {wrong} and click its paint.</source>
+        <translation>{wrong} auswählen und seine Farbe anklicken.</translation>
+    </message>
+    <message>
+        <source>Move and turn the hand slowly, near and far.</source>
+        <translation>Die Hand langsam bewegen und drehen, nah und fern.</translation>
+    </message>
+    <message>
+        <source>Enough: press Next.</source>
+        <translation>Genug: Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>bare skin</source>
+        <translation>bloße Haut</translation>
+    </message>
+    <message>
+        <source>the paint of {chosen}</source>
+        <translation>die Farbe von {chosen}</translation>
+    </message>
+    <message>
+        <source>{wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z.</source>
+        <translation>{wrong} kann nicht so bleiben: seine Zeile auswählen und seine Farbe anklicken oder Strg+Z drücken.</translation>
+    </message>
+    <message>
+        <source>Pick bare skin too: then it is said whether a marker looks like it.</source>
+        <translation>Auch bloße Haut aufnehmen: Dann wird gesagt, ob ein Marker ihr gleicht.</translation>
+    </message>
+    <message>
+        <source>By the rig&apos;s colours: {figure}</source>
+        <translation>Nach den Farben des Rigs: {figure}</translation>
+    </message>
+    <message>
+        <source>Space holds the pictures, if your hands are full.</source>
+        <translation>Die Leertaste hält die Bilder an, wenn die Hände voll sind.</translation>
+    </message>
+    <message>
+        <source>{camera} has not seen {name}: {why}</source>
+        <translation>{camera} hat {name} nicht gesehen: {why}</translation>
+    </message>
+    <message>
+        <source>Still to be seen in other places: {names}.</source>
+        <translation>Noch an anderen Orten zu sehen: {names}.</translation>
+    </message>
+    <message>
+        <source>Choose what to click next. The patches are the rig&apos;s colour and the one picked. A tick: enough places and angles were seen; a cross: the colour is another marker&apos;s or the skin&apos;s. Ctrl+Z takes the last click back; clicking a marker anew replaces what was gathered for it.</source>
+        <translation>Auswählen, was als Nächstes angeklickt wird. Die Felder sind die Farbe des Rigs und die aufgenommene. Ein Haken: genügend Orte und Winkel wurden gesehen; ein Kreuz: Die Farbe ist die eines anderen Markers oder der Haut. Strg+Z nimmt den letzten Klick zurück; ein neuer Klick auf einen Marker ersetzt, was für ihn gesammelt war.</translation>
+    </message>
+    <message>
+        <source>Hold the pictures</source>
+        <translation>Bilder anhalten</translation>
+    </message>
+    <message>
+        <source>Space. Then click at leisure; Space again lets them go on.</source>
+        <translation>Leertaste. Dann in Ruhe klicken; noch einmal lässt sie weiterlaufen.</translation>
+    </message>
+    <message>
+        <source>Ctrl+Z. The last click back.</source>
+        <translation>Strg+Z. Den letzten Klick zurück.</translation>
+    </message>
+    <message>
+        <source>Let the pictures go on</source>
+        <translation>Bilder weiterlaufen lassen</translation>
+    </message>
+    <message>
+        <source>not picked</source>
+        <translation>nicht aufgenommen</translation>
+    </message>
+    <message>
+        <source>Read what may be mistaken for a marker, then go on.</source>
+        <translation>Lesen, was für einen Marker gehalten werden kann, dann weiter.</translation>
+    </message>
+    <message>
+        <source>Trying the new bounds …</source>
+        <translation>Die neuen Grenzen werden ausprobiert …</translation>
+    </message>
+    <message>
+        <source>Tell them apart</source>
+        <translation>Auseinanderhalten</translation>
+    </message>
+    <message>
+        <source>No two colours overlap.</source>
+        <translation>Keine zwei Farben überschneiden sich.</translation>
+    </message>
+    <message>
+        <source>Which colour is taken for which</source>
+        <translation>Welche Farbe für welche gehalten wird</translation>
+    </message>
+    <message>
+        <source>The table: how much of each column&apos;s colour is taken for the marker of the row, in %, over all lamps that may come; of a marker&apos;s own colour by the lamp where that is least.</source>
+        <translation>Die Tabelle: wie viel von der Farbe jeder Spalte für den Marker der Zeile gehalten wird, in %, über alle Lampen, die kommen können; von der eigenen Farbe eines Markers bei der ungünstigsten Lampe.</translation>
+    </message>
+    <message>
+        <source>The chart: the blue line shows which hues the room has, and how much of each. Where it rises inside a marker&apos;s band, the room has things of that marker&apos;s colour.</source>
+        <translation>Das Diagramm: Die blaue Linie zeigt, welche Farbtöne der Raum hat und wie viel von jedem. Wo sie im Band eines Markers ansteigt, hat der Raum Dinge von dessen Farbe.</translation>
+    </message>
+    <message>
+        <source>this window cannot hear the markers; open the wizard from the main window.</source>
+        <translation>dieses Fenster hört die Marker nicht; den Assistenten aus dem Hauptfenster öffnen.</translation>
+    </message>
+    <message>
+        <source>Fitting the law …</source>
+        <translation>Das Gesetz wird angepasst …</translation>
+    </message>
+    <message>
+        <source>The law</source>
+        <translation>Das Gesetz</translation>
+    </message>
+    <message>
+        <source>Go back and measure at least {least_rows} distances.</source>
+        <translation>Zurückgehen und mindestens {least_rows} Abstände messen.</translation>
+    </message>
+    <message>
+        <source>The points should lie on the line, inside the band.</source>
+        <translation>Die Punkte sollen auf der Linie liegen, innerhalb des Bandes.</translation>
+    </message>
+    <message>
+        <source>Measure some distances first.</source>
+        <translation>Zuerst einige Abstände messen.</translation>
+    </message>
+    <message>
+        <source>Measure</source>
+        <translation>Messen</translation>
+    </message>
+    <message>
+        <source>The marker {name} is not seen by both cameras. Start tracking, and hold it into both pictures.</source>
+        <translation>Der Marker {name} wird nicht von beiden Kameras gesehen. Die Verfolgung starten und ihn in beide Bilder halten.</translation>
+    </message>
+    <message>
+        <source>The marker moves ({std:.1f} px). Lay it down or rest the hand, then press Space again.</source>
+        <translation>Der Marker bewegt sich ({std:.1f} px). Ihn hinlegen oder die Hand auflegen, dann noch einmal die Leertaste drücken.</translation>
+    </message>
+    <message>
+        <source>This cannot be measured: {reason}.</source>
+        <translation>Das lässt sich nicht messen: {reason}.</translation>
+    </message>
+    <message>
+        <source>{rows} of {enough} or more</source>
+        <translation>{rows} von {enough} oder mehr</translation>
+    </message>
+    <message>
+        <source>from near to far: the farthest three times the nearest</source>
+        <translation>von nah bis fern: der fernste dreimal so weit wie der nächste</translation>
+    </message>
+    <message>
+        <source>Hold the marker straight before the cameras, enter its distance, press Space.</source>
+        <translation>Den Marker gerade vor die Kameras halten, seinen Abstand eingeben, die Leertaste drücken.</translation>
+    </message>
+    <message>
+        <source>Now at another distance.</source>
+        <translation>Jetzt in einem anderen Abstand.</translation>
+    </message>
+    <message>
+        <source>Enough. Go on, or measure more.</source>
+        <translation>Genug. Weiter oder mehr messen.</translation>
+    </message>
+    <message>
+        <source>Now much nearer, or much farther away.</source>
+        <translation>Jetzt viel näher oder viel weiter weg.</translation>
+    </message>
+    <message>
+        <source>cm</source>
+        <translation>cm</translation>
+    </message>
+    <message>
+        <source>px</source>
+        <translation>px</translation>
+    </message>
+    <message>
+        <source>The marker that is held at the distance.</source>
+        <translation>Der Marker, der in den Abstand gehalten wird.</translation>
+    </message>
+    <message>
+        <source>From the middle between both lenses straight to the marker, by a tape measure.</source>
+        <translation>Von der Mitte zwischen beiden Objektiven gerade zum Marker, mit dem Maßband.</translation>
+    </message>
+    <message>
+        <source>Take this distance</source>
+        <translation>Diesen Abstand nehmen</translation>
+    </message>
+    <message>
+        <source>Space. Takes the disparity that both cameras have seen in the last second.</source>
+        <translation>Leertaste. Nimmt die Disparität, die beide Kameras in der letzten Sekunde gesehen haben.</translation>
+    </message>
+    <message>
+        <source>Disparity</source>
+        <translation>Disparität</translation>
+    </message>
+    <message>
+        <source>Distance, mean disparity and its spread within the second.</source>
+        <translation>Abstand, mittlere Disparität und ihre Streuung innerhalb der Sekunde.</translation>
+    </message>
+    <message>
+        <source>Remove the chosen row</source>
+        <translation>Gewählte Zeile entfernen</translation>
+    </message>
+    <message>
+        <source>Shows one marker at: choose the distance that you enter here.</source>
+        <translation>„Zeigt einen Marker bei“: den hier eingegebenen Abstand auswählen.</translation>
+    </message>
+    <message>
+        <source>{mean:.2f} ± {std:.2f} px</source>
+        <translation>{mean:.2f} ± {std:.2f} px</translation>
+    </message>
+    <message>
+        <source>not seen by both cameras</source>
+        <translation>nicht von beiden Kameras gesehen</translation>
+    </message>
+    <message>
+        <source>Hold still</source>
+        <translation>Still halten</translation>
+    </message>
+    <message>
+        <source>Rest the hand before both cameras, then press Record.</source>
+        <translation>Die Hand vor beiden Kameras ruhen lassen, dann Aufnehmen drücken.</translation>
+    </message>
+    <message>
+        <source>Holds still.</source>
+        <translation>Hält still.</translation>
+    </message>
+    <message>
+        <source>Move fast</source>
+        <translation>Schnell bewegen</translation>
+    </message>
+    <message>
+        <source>Press Record, then wave the hand briskly, 20 cm wide.</source>
+        <translation>Aufnehmen drücken, dann die Hand flott winken, 20 cm weit.</translation>
+    </message>
+    <message>
+        <source>Waves briskly.</source>
+        <translation>Winkt flott.</translation>
+    </message>
+    <message>
+        <source>Record both movements first.</source>
+        <translation>Zuerst beide Bewegungen aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Trying filters …</source>
+        <translation>Filter werden ausprobiert …</translation>
+    </message>
+    <message>
+        <source>markers that both cameras have seen so far</source>
+        <translation>Marker, die beide Kameras bisher gesehen haben</translation>
+    </message>
+    <message>
+        <source>Both cameras have not seen {names}.</source>
+        <translation>Nicht von beiden Kameras gesehen: {names}.</translation>
+    </message>
+    <message>
+        <source>of the time at rest that is needed</source>
+        <translation>der nötigen Zeit in Ruhe</translation>
+    </message>
+    <message>
+        <source>It moves: rest the hand on something.</source>
+        <translation>Sie bewegt sich: die Hand auf etwas auflegen.</translation>
+    </message>
+    <message>
+        <source>Good, hold still.</source>
+        <translation>Gut, still halten.</translation>
+    </message>
+    <message>
+        <source>The hand moved: rest it on something.</source>
+        <translation>Die Hand hat sich bewegt: sie auf etwas auflegen.</translation>
+    </message>
+    <message>
+        <source>of {brisk_m_s:.1f} m/s, the fastest marker of the last two seconds</source>
+        <translation>von {brisk_m_s:.1f} m/s, der schnellste Marker der letzten zwei Sekunden</translation>
+    </message>
+    <message>
+        <source>of the time at that speed that is needed</source>
+        <translation>der nötigen Zeit bei diesem Tempo</translation>
+    </message>
+    <message>
+        <source>Faster, 20 cm wide.</source>
+        <translation>Schneller, 20 cm weit.</translation>
+    </message>
+    <message>
+        <source>The hand was too slow.</source>
+        <translation>Die Hand war zu langsam.</translation>
+    </message>
+    <message>
+        <source>after depth (positions)</source>
+        <translation>nach der Tiefe (Orte)</translation>
+    </message>
+    <message>
+        <source>before depth (pixels)</source>
+        <translation>vor der Tiefe (Pixel)</translation>
+    </message>
+    <message>
+        <source>Of the last two seconds: jitter without filters and, at rest, with those in force, mm rms; and how far the filters lag behind, ms, while a marker moves.</source>
+        <translation>Der letzten zwei Sekunden: Jitter ohne Filter und, in Ruhe, mit den geltenden, mm rms; und wie weit die Filter nachhinken, ms, während sich ein Marker bewegt.</translation>
+    </message>
+    <message>
+        <source>Jitter, mm, and lag, ms, of now</source>
+        <translation>Jitter, mm, und Verzögerung, ms, von jetzt</translation>
+    </message>
+    <message>
+        <source>How much a marker may jitter at rest, rms.</source>
+        <translation>Wie stark ein Marker in Ruhe zittern darf, rms.</translation>
+    </message>
+    <message>
+        <source>How far a fast marker may lag behind.</source>
+        <translation>Wie weit ein schneller Marker nachhinken darf.</translation>
+    </message>
+    <message>
+        <source>There are two filters: one smooths the pixels before distances are computed, the other the positions after it.</source>
+        <translation>Es gibt zwei Filter: Einer glättet die Pixel, bevor Abstände berechnet werden, der andere danach die Orte.</translation>
+    </message>
+    <message>
+        <source>each marker its own settings</source>
+        <translation>jeder Marker mit eigenen Einstellungen</translation>
+    </message>
+    <message>
+        <source>Otherwise all markers get the settings that serve the worst of them.</source>
+        <translation>Sonst bekommen alle Marker die Einstellungen, die dem schlechtesten genügen.</translation>
+    </message>
+    <message>
+        <source>Jitter</source>
+        <translation>Jitter</translation>
+    </message>
+    <message>
+        <source>Lag</source>
+        <translation>Verzögerung</translation>
+    </message>
+    <message>
+        <source>Charts</source>
+        <translation>Diagramme</translation>
+    </message>
+    <message>
+        <source>Learn the empty scene and your hand first.</source>
+        <translation>Zuerst die leere Szene und die Hand lernen.</translation>
+    </message>
+    <message>
+        <source>Learn the empty scene</source>
+        <translation>Leere Szene lernen</translation>
+    </message>
+    <message>
+        <source>Learn my skin</source>
+        <translation>Meine Haut lernen</translation>
+    </message>
+    <message>
+        <source>Tried out at once by every node, and kept by none before the last step.</source>
+        <translation>Von jedem Knoten sofort ausprobiert und von keinem vor dem letzten Schritt behalten.</translation>
+    </message>
+    <message>
+        <source>a node learns neither background nor skin. Does rhot-node have the version of this program there?</source>
+        <translation>ein Knoten lernt weder Hintergrund noch Haut. Hat rhot-node dort die Version dieses Programms?</translation>
+    </message>
+    <message>
+        <source>{camera}: something moved in {moving:.1%} of the picture.</source>
+        <translation>{camera}: Etwas bewegte sich in {moving:.1%} des Bildes.</translation>
+    </message>
+    <message>
+        <source>What moves is no background.</source>
+        <translation>Was sich bewegt, ist kein Hintergrund.</translation>
+    </message>
+    <message>
+        <source>Keep out of the picture and learn it again.</source>
+        <translation>Aus dem Bild bleiben und ihn noch einmal lernen.</translation>
+    </message>
+    <message>
+        <source>{camera}: something in {skin:.1%} of the picture has the colours of skin.</source>
+        <translation>{camera}: Etwas in {skin:.1%} des Bildes hat die Farben von Haut.</translation>
+    </message>
+    <message>
+        <source>A hand that is learnt as background is not found there.</source>
+        <translation>Eine Hand, die als Hintergrund gelernt ist, wird dort nicht gefunden.</translation>
+    </message>
+    <message>
+        <source>If it is a hand or a face, take it away and learn again; if it is wood or cloth, go on.</source>
+        <translation>Ist es eine Hand oder ein Gesicht, wegnehmen und noch einmal lernen; ist es Holz oder Stoff, weiter.</translation>
+    </message>
+    <message>
+        <source>Empty scene</source>
+        <translation>Leere Szene</translation>
+    </message>
+    <message>
+        <source>{names}: the background was not learnt in time. Look at the Nodes panel, then learn it again.</source>
+        <translation>{names}: Der Hintergrund wurde nicht rechtzeitig gelernt. Das Feld Knoten ansehen, dann noch einmal lernen.</translation>
+    </message>
+    <message>
+        <source>the scene is learnt.</source>
+        <translation>die Szene ist gelernt.</translation>
+    </message>
+    <message>
+        <source>Keep out of the pictures.</source>
+        <translation>Aus den Bildern bleiben.</translation>
+    </message>
+    <message>
+        <source>Learnt. Go on, or learn it again after anything in the pictures has changed.</source>
+        <translation>Gelernt. Weiter, oder noch einmal lernen, wenn sich in den Bildern etwas geändert hat.</translation>
+    </message>
+    <message>
+        <source>Is the scene empty? Read what was seen, and learn it again.</source>
+        <translation>Ist die Szene leer? Lesen, was gesehen wurde, und noch einmal lernen.</translation>
+    </message>
+    <message>
+        <source>Take the hand out of both pictures and leave everything as it will be. Then press Learn.</source>
+        <translation>Die Hand aus beiden Bildern nehmen und alles so lassen, wie es sein wird. Dann Lernen drücken.</translation>
+    </message>
+    <message>
+        <source>empty scene</source>
+        <translation>leere Szene</translation>
+    </message>
+    <message>
+        <source>{seconds:g} s of every camera</source>
+        <translation>{seconds:g} s von jeder Kamera</translation>
+    </message>
+    <message>
+        <source>No skin was found in the picture of {names}, so the colours of any skin are used there. Hold the hand into both pictures and learn it again.</source>
+        <translation>Im Bild von {names} wurde keine Haut gefunden, daher gelten dort die Farben irgendeiner Haut. Die Hand in beide Bilder halten und noch einmal lernen.</translation>
+    </message>
+    <message>
+        <source>{name}: {covered:.1%} of the picture is the hand</source>
+        <translation>{name}: {covered:.1%} des Bildes ist die Hand</translation>
+    </message>
+    <message>
+        <source>One moment.</source>
+        <translation>Einen Moment.</translation>
+    </message>
+    <message>
+        <source>Hold your bare hand into both pictures, fingers spread, and press Learn.</source>
+        <translation>Die bloße Hand in beide Bilder halten, Finger gespreizt, und Lernen drücken.</translation>
+    </message>
+    <message>
+        <source>The hand and little else should be tinted: then press Next.</source>
+        <translation>Die Hand und wenig anderes soll getönt sein: dann Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>Read what is wrong, then learn it again.</source>
+        <translation>Lesen, was nicht stimmt, dann noch einmal lernen.</translation>
+    </message>
+    <message>
+        <source>a node gave a foreground that cannot be read; restart it.</source>
+        <translation>ein Knoten lieferte einen Vordergrund, der nicht lesbar ist; ihn neu starten.</translation>
+    </message>
+    <message>
+        <source>{camera}: the hand covers {told_apart} % of the picture, less than {least:g} %.</source>
+        <translation>{camera}: Die Hand bedeckt {told_apart} % des Bildes, weniger als {least:g} %.</translation>
+    </message>
+    <message>
+        <source>It was in the picture while the empty scene was learnt, or is not there now.</source>
+        <translation>Sie war im Bild, während die leere Szene gelernt wurde, oder ist jetzt nicht da.</translation>
+    </message>
+    <message>
+        <source>Hold it into the picture; if it is there, go back and learn the empty scene without it.</source>
+        <translation>Sie ins Bild halten; ist sie da, zurückgehen und die leere Szene ohne sie lernen.</translation>
+    </message>
+    <message>
+        <source>{camera}: {told_apart} % of the picture differs from the empty scene, more than {most:g} %.</source>
+        <translation>{camera}: {told_apart} % des Bildes weicht von der leeren Szene ab, mehr als {most:g} %.</translation>
+    </message>
+    <message>
+        <source>Light, exposure or the camera have changed since.</source>
+        <translation>Licht, Belichtung oder die Kamera haben sich seither geändert.</translation>
+    </message>
+    <message>
+        <source>Go back and learn the empty scene again.</source>
+        <translation>Zurückgehen und die leere Szene noch einmal lernen.</translation>
+    </message>
+    <message>
+        <source>{camera}: {whole:.0%} of what is tinted is not the hand.</source>
+        <translation>{camera}: {whole:.0%} des Getönten ist nicht die Hand.</translation>
+    </message>
+    <message>
+        <source>Shadows, a second hand, a face or moving things.</source>
+        <translation>Schatten, eine zweite Hand, ein Gesicht oder bewegte Dinge.</translation>
+    </message>
+    <message>
+        <source>Take them away, or have more even light.</source>
+        <translation>Sie wegnehmen oder für gleichmäßigeres Licht sorgen.</translation>
+    </message>
+    <message>
+        <source>Each node keeps what it had, and Restore the old one brings it back here, until this window closes.</source>
+        <translation>Jeder Knoten behält, was er hatte, und „Die alte wiederherstellen“ holt es hier zurück, bis dieses Fenster schließt.</translation>
+    </message>
+    <message>
+        <source>{name} still has what was learnt now: {exc}</source>
+        <translation>{name} hat noch, was jetzt gelernt wurde: {exc}</translation>
+    </message>
+    <message>
+        <source>{name}: background</source>
+        <translation>{name}: Hintergrund</translation>
+    </message>
+    <message>
+        <source>learnt now</source>
+        <translation>jetzt gelernt</translation>
+    </message>
+    <message>
+        <source>{name}: skin</source>
+        <translation>{name}: Haut</translation>
+    </message>
+    <message>
+        <source>Calibrate, Tracker chooses the bare hand.</source>
+        <translation>Kalibrieren, Tracker wählt die bloße Hand aus.</translation>
+    </message>
+    <message>
+        <source>learnt earlier</source>
+        <translation>früher gelernt</translation>
+    </message>
+    <message>
+        <source>Next waits for this size: every length that is measured later comes from it.</source>
+        <translation>Weiter wartet auf diese Größe: Jede Länge, die später gemessen wird, kommt aus ihr.</translation>
+    </message>
+    <message>
+        <source>Not seen: {missing}.</source>
+        <translation>Nicht gesehen: {missing}.</translation>
+    </message>
+    <message>
+        <source>Go back: the board is another one than the form says.</source>
+        <translation>Zurückgehen: Das Brett ist ein anderes, als das Formular sagt.</translation>
+    </message>
+    <message>
+        <source>Your board</source>
+        <translation>Das Brett</translation>
+    </message>
+    <message>
+        <source>Say which board you hold.</source>
+        <translation>Sagen, welches Brett es ist.</translation>
+    </message>
+    <message>
+        <source>Count the corners again.</source>
+        <translation>Die Ecken noch einmal zählen.</translation>
+    </message>
+    <message>
+        <source>Measure the {parts} and type their size.</source>
+        <translation>Messen und die Größe eintippen: {parts}.</translation>
+    </message>
+    <message>
+        <source>Seen: this is the board. Press Next.</source>
+        <translation>Gesehen: Das ist das Brett. Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>Show the board to check it.</source>
+        <translation>Das Brett zeigen, um es zu prüfen.</translation>
+    </message>
+    <message>
+        <source>Seen by {names}: this is the board.</source>
+        <translation>Gesehen von {names}: Das ist das Brett.</translation>
+    </message>
+    <message>
+        <source>This board looks the same turned by 180°: hold it the same way up all the time, or use one with an even and an odd number of corners, or with an odd number of rows of circles.</source>
+        <translation>Dieses Brett sieht um 180° gedreht gleich aus: es die ganze Zeit gleich herum halten oder eines mit einer geraden und einer ungeraden Eckenzahl oder mit ungerader Zahl von Kreisreihen nehmen.</translation>
+    </message>
+    <message>
+        <source>Measure ten with a ruler and divide by ten: printers scale. The scale of everything that is measured later comes from this number.</source>
+        <translation>Zehn mit dem Lineal messen und durch zehn teilen: Drucker skalieren. Der Maßstab von allem, was später gemessen wird, kommt aus dieser Zahl.</translation>
+    </message>
+    <message>
+        <source>Chessboard</source>
+        <translation>Schachbrett</translation>
+    </message>
+    <message>
+        <source>Inner corners</source>
+        <translation>Innere Ecken</translation>
+    </message>
+    <message>
+        <source>Count the points where four squares meet: a board of 10 × 7 squares has 9 × 6.</source>
+        <translation>Die Punkte zählen, an denen vier Felder zusammenstoßen: Ein Brett mit 10 × 7 Feldern hat 9 × 6.</translation>
+    </message>
+    <message>
+        <source>Square, mm</source>
+        <translation>Feld, mm</translation>
+    </message>
+    <message>
+        <source>The side of one square as it came out of the printer.</source>
+        <translation>Die Seite eines Feldes, wie es aus dem Drucker kam.</translation>
+    </message>
+    <message>
+        <source>ChArUco board</source>
+        <translation>ChArUco-Brett</translation>
+    </message>
+    <message>
+        <source>Squares</source>
+        <translation>Felder</translation>
+    </message>
+    <message>
+        <source>Count the squares.</source>
+        <translation>Die Felder zählen.</translation>
+    </message>
+    <message>
+        <source>Tags</source>
+        <translation>Tags</translation>
+    </message>
+    <message>
+        <source>Count the tags: tagCols, tagRows of Kalibr&apos;s file.</source>
+        <translation>Die Tags zählen: tagCols, tagRows der Datei von Kalibr.</translation>
+    </message>
+    <message>
+        <source>Tag, mm</source>
+        <translation>Tag, mm</translation>
+    </message>
+    <message>
+        <source>The side of a tag&apos;s black square, tagSize in Kalibr&apos;s file (which has metres).</source>
+        <translation>Die Seite des schwarzen Quadrats eines Tags, tagSize in der Datei von Kalibr (die Meter hat).</translation>
+    </message>
+    <message>
+        <source>Circles, asymmetric</source>
+        <translation>Kreise, asymmetrisch</translation>
+    </message>
+    <message>
+        <source>Circles</source>
+        <translation>Kreise</translation>
+    </message>
+    <message>
+        <source>Count the circles in one row, and then the rows: 4 × 11 is usual.</source>
+        <translation>Die Kreise einer Reihe zählen, dann die Reihen: 4 × 11 ist üblich.</translation>
+    </message>
+    <message>
+        <source>Spacing, mm</source>
+        <translation>Abstand, mm</translation>
+    </message>
+    <message>
+        <source>From one row of circles to the next, which is half as far as from one circle to the next in its row.</source>
+        <translation>Von einer Kreisreihe zur nächsten; das ist halb so weit wie von einem Kreis zum nächsten in seiner Reihe.</translation>
+    </message>
+    <message>
+        <source>The gap between two tags as a part of their side, tagSpacing in Kalibr&apos;s file.</source>
+        <translation>Die Lücke zwischen zwei Tags als Teil ihrer Seite, tagSpacing in der Datei von Kalibr.</translation>
+    </message>
+    <message>
+        <source>printed with OpenCV before 4.6</source>
+        <translation>gedruckt mit OpenCV vor 4.6</translation>
+    </message>
+    <message>
+        <source>Older programs began ChArUco boards with an even number of rows with a white square.</source>
+        <translation>Ältere Programme begannen ChArUco-Bretter mit gerader Zeilenzahl mit einem weißen Feld.</translation>
+    </message>
+    <message>
+        <source>Board</source>
+        <translation>Brett</translation>
+    </message>
+    <message>
+        <source>Gap, of a tag</source>
+        <translation>Lücke, eines Tags</translation>
+    </message>
+    <message>
+        <source>Marker, mm</source>
+        <translation>Marker, mm</translation>
+    </message>
+    <message>
+        <source>Family</source>
+        <translation>Familie</translation>
+    </message>
+    <message>
+        <source>Print this board</source>
+        <translation>Dieses Brett drucken</translation>
+    </message>
+    <message>
+        <source>Writes it as a PDF of the usual size with a ruler, and opens that to be printed.</source>
+        <translation>Schreibt es als PDF der üblichen Größe mit einem Lineal und öffnet es zum Drucken.</translation>
+    </message>
+    <message>
+        <source>Shows a board: {board} inner corners, squares of {square_mm:g} mm.</source>
+        <translation>„Zeigt ein Brett“: {board} innere Ecken, Felder von {square_mm:g} mm.</translation>
+    </message>
+    <message>
+        <source>measure it</source>
+        <translation>messen</translation>
+    </message>
+    <message>
+        <source>last time {last:g}</source>
+        <translation>letztes Mal {last:g}</translation>
+    </message>
+    <message>
+        <source>three quarters of a square</source>
+        <translation>drei Viertel eines Feldes</translation>
+    </message>
+    <message>
+        <source>{counted} across</source>
+        <translation>{counted} waagerecht</translation>
+    </message>
+    <message>
+        <source>Rows of circles</source>
+        <translation>Kreisreihen</translation>
+    </message>
+    <message>
+        <source>{counted} down</source>
+        <translation>{counted} senkrecht</translation>
+    </message>
+    <message>
+        <source>{parent}: cannot be made ({strerror}), so there is no board to print.</source>
+        <translation>{parent}: lässt sich nicht anlegen ({strerror}), daher gibt es kein Brett zu drucken.</translation>
+    </message>
+    <message>
+        <source>{told} Print it at 100 % and glue it flat. {note}</source>
+        <translation>{told} Mit 100 % drucken und eben aufkleben. {note}</translation>
+    </message>
+    <message>
+        <source>Written to {path} and opened.</source>
+        <translation>In {path} geschrieben und geöffnet.</translation>
+    </message>
+    <message>
+        <source>Written to {path}; this desktop opens no PDF.</source>
+        <translation>In {path} geschrieben; dieser Desktop öffnet keine PDF.</translation>
+    </message>
+    <message>
+        <source>Go back: something was not recorded yet.</source>
+        <translation>Zurückgehen: Etwas wurde noch nicht aufgenommen.</translation>
+    </message>
+    <message>
+        <source>{count} of {wanted}</source>
+        <translation>{count} von {wanted}</translation>
+    </message>
+    <message>
+        <source>{meaning}
+Untick it to leave it to the camera.</source>
+        <translation>{meaning}
+Haken entfernen, um es der Kamera zu überlassen.</translation>
+    </message>
+    <message>
+        <source>{name}, slider</source>
+        <translation>{name}, Regler</translation>
+    </message>
+    <message>
+        <source>There is no result yet.</source>
+        <translation>Es gibt noch kein Ergebnis.</translation>
+    </message>
+    <message>
+        <source>Looking for the board in the films</source>
+        <translation>Das Brett wird in den Filmen gesucht</translation>
+    </message>
+    <message>
+        <source>Choose the film of {missing}, too.</source>
+        <translation>Auch den Film von {missing} auswählen.</translation>
+    </message>
+    <message>
+        <source>Or go back to the live cameras.</source>
+        <translation>Oder zurück zu den Live-Kameras.</translation>
+    </message>
+    <message>
+        <source>Choose another film, or the live cameras.</source>
+        <translation>Einen anderen Film oder die Live-Kameras wählen.</translation>
+    </message>
+    <message>
+        <source>One moment: films are read.</source>
+        <translation>Einen Moment: Filme werden gelesen.</translation>
+    </message>
+    <message>
+        <source>{shots} frames were chosen.</source>
+        <translation>{shots} Bilder wurden ausgewählt.</translation>
+    </message>
+    <message>
+        <source>Press Next. Better: a film in which the board comes to all parts of the picture.</source>
+        <translation>Weiter drücken. Besser: ein Film, in dem das Brett in alle Teile des Bildes kommt.</translation>
+    </message>
+    <message>
+        <source>Too few: film the board in more places, still in each.</source>
+        <translation>Zu wenige: das Brett an mehr Orten filmen, an jedem still.</translation>
+    </message>
+    <message>
+        <source>Films began together</source>
+        <translation>Filme begannen gemeinsam</translation>
+    </message>
+    <message>
+        <source>How it is known by how much one film began later than the other: by what all cameras heard, or by a light that went on once.</source>
+        <translation>Woher bekannt ist, um wie viel ein Film später begann als der andere: durch etwas, das alle Kameras hörten, oder durch ein Licht, das einmal anging.</translation>
+    </message>
+    <message>
+        <source>Live cameras</source>
+        <translation>Live-Kameras</translation>
+    </message>
+    <message>
+        <source>Films are left out; views are taken of the live cameras again.</source>
+        <translation>Filme bleiben weg; Ansichten kommen wieder von den Live-Kameras.</translation>
+    </message>
+    <message>
+        <source>A recorded film of the board in place of the live camera: move the board, rest it for half a second, and move it on. Frames are chosen by themselves.</source>
+        <translation>Ein aufgenommener Film des Bretts statt der Live-Kamera: das Brett bewegen, eine halbe Sekunde ruhen lassen und weiterbewegen. Bilder werden von selbst ausgewählt.</translation>
+    </message>
+    <message>
+        <source>Use a film of {camera} …</source>
+        <translation>Film von {camera} verwenden …</translation>
+    </message>
+    <message>
+        <source>Film of {camera}</source>
+        <translation>Film von {camera}</translation>
+    </message>
+    <message>
+        <source>current</source>
+        <translation>aktuell</translation>
+    </message>
+    <message>
+        <source>to come</source>
+        <translation>kommt noch</translation>
+    </message>
+    <message>
+        <source>Escape. Nothing is saved before &quot;Use this calibration&quot;.</source>
+        <translation>Escape. Vor „Diese Kalibrierung benutzen“ wird nichts gespeichert.</translation>
+    </message>
+    <message>
+        <source>Back</source>
+        <translation>Zurück</translation>
+    </message>
+    <message>
+        <source>Alt+Left. Nothing is lost.</source>
+        <translation>Alt+Links. Nichts geht verloren.</translation>
+    </message>
+    <message>
+        <source>Next</source>
+        <translation>Weiter</translation>
+    </message>
+    <message>
+        <source>Simulated hand does …</source>
+        <translation>Was die simulierte Hand tut …</translation>
+    </message>
+    <message>
+        <source>The simulated rig only: what stands before its cameras.</source>
+        <translation>Nur das simulierte Rig: was vor seinen Kameras steht.</translation>
+    </message>
+    <message>
+        <source>Begin again</source>
+        <translation>Neu beginnen</translation>
+    </message>
+    <message>
+        <source>{sentence} {left:.0f} s left.</source>
+        <translation>{sentence} Noch {left:.0f} s.</translation>
+    </message>
+    <message>
+        <source>{shortfall} Record again.</source>
+        <translation>{shortfall} Noch einmal aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Recorded. Go on, or record again.</source>
+        <translation>Aufgenommen. Weiter oder noch einmal aufnehmen.</translation>
+    </message>
+    <message>
+        <source>of {seconds:.0f} s recorded</source>
+        <translation>von {seconds:.0f} s aufgenommen</translation>
+    </message>
+    <message>
+        <source>markers measured by the cameras at this moment</source>
+        <translation>Marker, die die Kameras in diesem Augenblick messen</translation>
+    </message>
+    <message>
+        <source>The engine records what the cameras send, into a file that goes when this window closes.</source>
+        <translation>Die Engine zeichnet auf, was die Kameras senden, in eine Datei, die mit diesem Fenster verschwindet.</translation>
+    </message>
+    <message>
+        <source>Record again</source>
+        <translation>Noch einmal aufnehmen</translation>
+    </message>
+    <message>
+        <source>Space. Begins or ends the recording; it ends by itself when the time is over.</source>
+        <translation>Leertaste. Beginnt oder beendet die Aufnahme; sie endet von selbst, wenn die Zeit um ist.</translation>
+    </message>
+    <message>
+        <source>Restore the old one</source>
+        <translation>Die alte wiederherstellen</translation>
+    </message>
+    <message>
+        <source>Brings back what was there before.</source>
+        <translation>Holt zurück, was vorher da war.</translation>
+    </message>
+    <message>
+        <source>Nothing was saved so far. {ways_back}</source>
+        <translation>Bisher wurde nichts gespeichert. {ways_back}</translation>
+    </message>
+    <message>
+        <source>Verdict: {word}. {sentence}</source>
+        <translation>Urteil: {word}. {sentence}</translation>
+    </message>
+    <message>
+        <source>Live picture of camera {name}</source>
+        <translation>Live-Bild der Kamera {name}</translation>
+    </message>
+    <message>
+        <source>A click shows this picture large.</source>
+        <translation>Ein Klick zeigt dieses Bild groß.</translation>
+    </message>
+    <message>
+        <source>Mend what the verdict says.</source>
+        <translation>Beheben, was das Urteil sagt.</translation>
+    </message>
+    <message>
+        <source>Look at the result, then go on.</source>
+        <translation>Das Ergebnis ansehen, dann weiter.</translation>
+    </message>
+    <message>
+        <source>Result</source>
+        <translation>Ergebnis</translation>
+    </message>
+    <message>
+        <source>Go back: nothing was recorded yet.</source>
+        <translation>Zurückgehen: Noch wurde nichts aufgenommen.</translation>
+    </message>
+    <message>
+        <source>It did not work out.</source>
+        <translation>Es hat nicht geklappt.</translation>
+    </message>
+    <message>
+        <source>Read what is wrong, then go back.</source>
+        <translation>Lesen, was nicht stimmt, dann zurückgehen.</translation>
+    </message>
+    <message>
+        <source>Before and after</source>
+        <translation>Vorher und nachher</translation>
+    </message>
+    <message>
+        <source>Use this calibration</source>
+        <translation>Diese Kalibrierung benutzen</translation>
+    </message>
+    <message>
+        <source>It is in use and saved.</source>
+        <translation>Sie ist in Kraft und gespeichert.</translation>
+    </message>
+    <message>
+        <source>The old one is back.</source>
+        <translation>Die alte ist wieder da.</translation>
+    </message>
+    <message>
+        <source>This must not be used: go back and mend what the verdict says.</source>
+        <translation>Das darf nicht benutzt werden: zurückgehen und beheben, was das Urteil sagt.</translation>
+    </message>
+    <message>
+        <source>Compare, then use this calibration or go back.</source>
+        <translation>Vergleichen, dann diese Kalibrierung benutzen oder zurückgehen.</translation>
+    </message>
+    <message>
+        <source>Close without using this calibration? What was captured here is lost; the calibration in force stays as it is.</source>
+        <translation>Schließen, ohne diese Kalibrierung zu benutzen? Was hier aufgenommen wurde, geht verloren; die geltende Kalibrierung bleibt, wie sie ist.</translation>
+    </message>
+    <message>
+        <source>Stopped. Go on with Begin again, or go back.</source>
+        <translation>Angehalten. Weiter mit Neu beginnen oder zurückgehen.</translation>
+    </message>
+    <message>
+        <source>The work was stopped.</source>
+        <translation>Die Arbeit wurde angehalten.</translation>
+    </message>
+    <message>
+        <source>The scale comes from the board&apos;s squares alone; a second length finds a wrong number. Next waits for one, or for Skip below.</source>
+        <translation>Der Maßstab kommt allein aus den Feldern des Bretts; eine zweite Länge entdeckt eine falsche Zahl. Weiter wartet auf eine oder auf „Überspringen“ unten.</translation>
+    </message>
+    <message>
+        <source>The rig file will say that no length was checked, and so will the app.</source>
+        <translation>Die Rig-Datei und die App werden sagen, dass keine Länge geprüft wurde.</translation>
+    </message>
+    <message>
+        <source>A known length</source>
+        <translation>Eine bekannte Länge</translation>
+    </message>
+    <message>
+        <source>Click both ends of the ruler in each picture, in the same order.</source>
+        <translation>In jedem Bild beide Enden des Lineals anklicken, in derselben Reihenfolge.</translation>
+    </message>
+    <message>
+        <source>Hold the ruler where both cameras see it, and press Space.</source>
+        <translation>Das Lineal dorthin halten, wo beide Kameras es sehen, und die Leertaste drücken.</translation>
+    </message>
+    <message>
+        <source>The scale will be checked: press Next.</source>
+        <translation>Der Maßstab wird geprüft: Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>Lengths stay unproven: press Next.</source>
+        <translation>Längen bleiben unbewiesen: Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>Measure a second length.</source>
+        <translation>Eine zweite Länge messen.</translation>
+    </message>
+    <message>
+        <source>Skip: lengths stay unproven</source>
+        <translation>Überspringen: Längen bleiben unbewiesen</translation>
+    </message>
+    <message>
+        <source>Shows a ruler: its crosses are {length_mm:g} mm apart.</source>
+        <translation>„Zeigt ein Lineal“: Seine Kreuze sind {length_mm:g} mm auseinander.</translation>
+    </message>
+    <message>
+        <source>The distance between the middles of the two lenses, measured by hand. 75 mm on the frame that the thesis describes.</source>
+        <translation>Der Abstand zwischen den Mitten der beiden Objektive, von Hand gemessen. 75 mm an dem Gestell, das die Arbeit beschreibt.</translation>
+    </message>
+    <message>
+        <source>The distance between two marks on a ruler, 200 mm for instance, that both cameras see.</source>
+        <translation>Der Abstand zwischen zwei Marken auf einem Lineal, etwa 200 mm, die beide Kameras sehen.</translation>
+    </message>
+    <message>
+        <source>Lens to lens</source>
+        <translation>Objektiv zu Objektiv</translation>
+    </message>
+    <message>
+        <source>Space. Then click both ends of the ruler in each picture.</source>
+        <translation>Leertaste. Dann in jedem Bild beide Enden des Lineals anklicken.</translation>
+    </message>
+    <message>
+        <source>If the size of the squares was typed wrong, every length is wrong by the same factor and nothing will tell.</source>
+        <translation>Wurde die Größe der Felder falsch eingetippt, ist jede Länge um denselben Faktor falsch, und nichts wird es verraten.</translation>
+    </message>
+    <message>
+        <source>Do not skip</source>
+        <translation>Nicht überspringen</translation>
+    </message>
+    <message>
+        <source>not measured</source>
+        <translation>nicht gemessen</translation>
+    </message>
+    <message>
+        <source>not yet</source>
+        <translation>noch nicht</translation>
+    </message>
+    <message>
+        <source>This rig came from no file, so there are no earlier versions of it. Save it first.</source>
+        <translation>Dieses Rig kam aus keiner Datei, daher gibt es keine früheren Fassungen. Es zuerst speichern.</translation>
+    </message>
+    <message>
+        <source>today</source>
+        <translation>heute</translation>
+    </message>
+    <message>
+        <source>yesterday</source>
+        <translation>gestern</translation>
+    </message>
+    <message numerus="yes">
+        <source>{n} day ago</source>
+        <comment>{n} days ago</comment>
+        <translation>
+            <numerusform>vor {n} Tag</numerusform>
+            <numerusform>vor {n} Tagen</numerusform>
+        </translation>
+    </message>
+    <message numerus="yes">
+        <source>{n} month ago</source>
+        <comment>{n} months ago</comment>
+        <translation>
+            <numerusform>vor {n} Monat</numerusform>
+            <numerusform>vor {n} Monaten</numerusform>
+        </translation>
+    </message>
+    <message>
+        <source>from the left to the right edge</source>
+        <translation>vom linken zum rechten Rand</translation>
+    </message>
+    <message>
+        <source>from the upper to the lower edge</source>
+        <translation>vom oberen zum unteren Rand</translation>
+    </message>
+    <message>
+        <source>near enough to fill much of the picture</source>
+        <translation>nah genug, um einen großen Teil des Bildes zu füllen</translation>
+    </message>
+    <message>
+        <source>tilted, which tells the focal length</source>
+        <translation>geneigt, das zeigt die Brennweite</translation>
+    </message>
+    <message>
+        <source>Camera and board</source>
+        <translation>Kamera und Brett</translation>
+    </message>
+    <message>
+        <source>Show the board</source>
+        <translation>Das Brett zeigen</translation>
+    </message>
+    <message>
+        <source>the first step is not done without a board</source>
+        <translation>der erste Schritt ist ohne Brett nicht erledigt</translation>
+    </message>
+    <message>
+        <source>Show the whole board to the camera.</source>
+        <translation>Der Kamera das ganze Brett zeigen.</translation>
+    </message>
+    <message>
+        <source>parts of the picture in which corners were seen</source>
+        <translation>Teile des Bildes, in denen Ecken gesehen wurden</translation>
+    </message>
+    <message>
+        <source>{count} pictures taken.</source>
+        <translation>{count} Bilder aufgenommen.</translation>
+    </message>
+    <message>
+        <source>Estimating the intrinsics</source>
+        <translation>Die Intrinsik wird geschätzt</translation>
+    </message>
+    <message>
+        <source>arrows: residuals × {times:,.0f}</source>
+        <translation>Pfeile: Residuen × {times:,.0f}</translation>
+    </message>
+    <message>
+        <source>Whose intrinsics are calibrated. One camera at a time.</source>
+        <translation>Wessen Intrinsik kalibriert wird. Eine Kamera nach der anderen.</translation>
+    </message>
+    <message>
+        <source>Straighten the picture</source>
+        <translation>Bild entzerren</translation>
+    </message>
+    <message>
+        <source>Shows the live picture without the lens&apos;s distortion: hold a ruler before the camera, it must be straight everywhere.</source>
+        <translation>Zeigt das Live-Bild ohne die Verzeichnung des Objektivs: Ein Lineal vor der Kamera muss überall gerade sein.</translation>
+    </message>
+    <message>
+        <source>Pixels are square</source>
+        <translation>Pixel sind quadratisch</translation>
+    </message>
+    <message>
+        <source>Forces one focal length for both directions, as nearly every sensor has it. Fewer numbers to find need fewer views.</source>
+        <translation>Erzwingt eine Brennweite für beide Richtungen, wie fast jeder Sensor sie hat. Weniger Unbekannte brauchen weniger Ansichten.</translation>
+    </message>
+    <message>
+        <source>How well each view fits. Arrows in the picture are the mean residual of each part: a pattern in them is something that the lens model does not explain.</source>
+        <translation>Wie gut jede Ansicht passt. Pfeile im Bild sind das mittlere Residuum jedes Teils: Ein Muster darin ist etwas, das das Objektivmodell nicht erklärt.</translation>
+    </message>
+    <message>
+        <source>Calibrating the cameras</source>
+        <translation>Die Kameras werden kalibriert</translation>
+    </message>
+    <message>
+        <source>Show the board to both cameras.</source>
+        <translation>Das Brett beiden Kameras zeigen.</translation>
+    </message>
+    <message>
+        <source>shots that both cameras share</source>
+        <translation>Aufnahmen, die beide Kameras teilen</translation>
+    </message>
+    <message>
+        <source>{shots} shots</source>
+        <translation>{shots} Aufnahmen</translation>
+    </message>
+    <message>
+        <source>every camera shares enough shots with another</source>
+        <translation>jede Kamera teilt genügend Aufnahmen mit einer anderen</translation>
+    </message>
+    <message>
+        <source>{name} covered</source>
+        <translation>{name} abgedeckt</translation>
+    </message>
+    <message>
+        <source>part of the picture where the board was</source>
+        <translation>Teil des Bildes, in dem das Brett war</translation>
+    </message>
+    <message>
+        <source>tilted</source>
+        <translation>geneigt</translation>
+    </message>
+    <message>
+        <source>the board was seen tilted: this tells the focal length</source>
+        <translation>das Brett wurde geneigt gesehen: Das zeigt die Brennweite</translation>
+    </message>
+    <message>
+        <source>near and far</source>
+        <translation>nah und fern</translation>
+    </message>
+    <message>
+        <source>the board was seen large and small</source>
+        <translation>das Brett wurde groß und klein gesehen</translation>
+    </message>
+    <message>
+        <source>Hold the board still.</source>
+        <translation>Das Brett still halten.</translation>
+    </message>
+    <message>
+        <source>The table</source>
+        <translation>Der Tisch</translation>
+    </message>
+    <message>
+        <source>Lay the board flat on the table and press Space, or press Next.</source>
+        <translation>Das Brett flach auf den Tisch legen und die Leertaste drücken, oder Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>Without a table the world begins at camera {first}, and the scene is not level.</source>
+        <translation>Ohne Tisch beginnt die Welt bei Kamera {first}, und die Szene liegt nicht waagerecht.</translation>
+    </message>
+    <message>
+        <source>Lay the board flat and press Space again.</source>
+        <translation>Das Brett flach hinlegen und noch einmal die Leertaste drücken.</translation>
+    </message>
+    <message>
+        <source>The table is known: press Next.</source>
+        <translation>Der Tisch ist bekannt: Weiter drücken.</translation>
+    </message>
+    <message>
+        <source>Earlier calibrations</source>
+        <translation>Frühere Kalibrierungen</translation>
+    </message>
+    <message>
+        <source>Bring it back</source>
+        <translation>Zurückholen</translation>
+    </message>
+    <message>
+        <source>Puts the chosen version into force. What is there now is kept, and can be brought back the same way.</source>
+        <translation>Setzt die gewählte Fassung in Kraft. Was jetzt gilt, bleibt erhalten und lässt sich ebenso zurückholen.</translation>
+    </message>
+    <message>
+        <source>{date}
+before {reason}</source>
+        <translation>{date}
+vor {reason}</translation>
+    </message>
+    <message>
+        <source>Nothing has been replaced yet: there is no earlier calibration of this rig.</source>
+        <translation>Noch wurde nichts ersetzt: Es gibt keine frühere Kalibrierung dieses Rigs.</translation>
+    </message>
+    <message>
+        <source>This version says the same as the rig does now.</source>
+        <translation>Diese Fassung sagt dasselbe wie das Rig jetzt.</translation>
+    </message>
+    <message>
+        <source>It is back in force. What was there before stands first in the list now.</source>
+        <translation>Sie gilt wieder. Was vorher da war, steht jetzt zuerst in der Liste.</translation>
+    </message>
 </context>
 </TS>
