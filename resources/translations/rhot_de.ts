@@ -5313,7 +5313,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>Balance on grey</source>
-        <translation>Auf Grau abgleichen</translation>
+        <translation>Grauabgleich</translation>
     </message>
     <message>
         <source>Drag over something grey or white in a picture first, a sheet of paper for instance. Press again until nothing changes.</source>
