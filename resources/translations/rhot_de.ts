@@ -2066,6 +2066,22 @@ http://192.168.1.20:8080/video oder rtsp://192.168.1.21/live</translation>
         <translation>Landmarke</translation>
     </message>
     <message>
+        <source>skin</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>squares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>tags</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>spacings</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>left hand</source>
         <translation>linke Hand</translation>
     </message>
@@ -4680,8 +4696,144 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Finger, die sich in den Bildern kreuzen: Zeige- und Mittelfinger, Klein- und Ringfinger, der Daumen über der Handfläche, die Hand hochkant.</translation>
     </message>
     <message>
+        <source>Hold still</source>
+        <translation>Still halten</translation>
+    </message>
+    <message>
+        <source>Rest the hand before both cameras, then press Record.</source>
+        <translation>Die Hand vor beiden Kameras ruhen lassen, dann Aufnehmen drücken.</translation>
+    </message>
+    <message>
+        <source>Holds still.</source>
+        <translation>Hält still.</translation>
+    </message>
+    <message>
+        <source>Move fast</source>
+        <translation>Schnell bewegen</translation>
+    </message>
+    <message>
+        <source>Press Record, then wave the hand briskly, 20 cm wide.</source>
+        <translation>Aufnehmen drücken, dann die Hand flott winken, 20 cm weit.</translation>
+    </message>
+    <message>
+        <source>Waves briskly.</source>
+        <translation>Winkt flott.</translation>
+    </message>
+    <message>
+        <source>Record both movements first.</source>
+        <translation>Zuerst beide Bewegungen aufnehmen.</translation>
+    </message>
+    <message>
+        <source>Trying filters …</source>
+        <translation>Filter werden ausprobiert …</translation>
+    </message>
+    <message>
+        <source>markers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>markers that both cameras have seen so far</source>
+        <translation>Marker, die beide Kameras bisher gesehen haben</translation>
+    </message>
+    <message>
+        <source>Both cameras have not seen {names}.</source>
+        <translation>Nicht von beiden Kameras gesehen: {names}.</translation>
+    </message>
+    <message>
+        <source>of the time at rest that is needed</source>
+        <translation>der nötigen Zeit in Ruhe</translation>
+    </message>
+    <message>
+        <source>It moves: rest the hand on something.</source>
+        <translation>Sie bewegt sich: die Hand auf etwas auflegen.</translation>
+    </message>
+    <message>
+        <source>Good, hold still.</source>
+        <translation>Gut, still halten.</translation>
+    </message>
+    <message>
+        <source>The hand moved: rest it on something.</source>
+        <translation>Die Hand hat sich bewegt: sie auf etwas auflegen.</translation>
+    </message>
+    <message>
+        <source>of {brisk_m_s:.1f} m/s, the fastest marker of the last two seconds</source>
+        <translation>von {brisk_m_s:.1f} m/s, der schnellste Marker der letzten zwei Sekunden</translation>
+    </message>
+    <message>
         <source>fast</source>
         <translation>schnell</translation>
+    </message>
+    <message>
+        <source>of the time at that speed that is needed</source>
+        <translation>der nötigen Zeit bei diesem Tempo</translation>
+    </message>
+    <message>
+        <source>Faster, 20 cm wide.</source>
+        <translation>Schneller, 20 cm weit.</translation>
+    </message>
+    <message>
+        <source>The hand was too slow.</source>
+        <translation>Die Hand war zu langsam.</translation>
+    </message>
+    <message>
+        <source>raw</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>filtered</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>lag</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>after depth (positions)</source>
+        <translation>nach der Tiefe (Orte)</translation>
+    </message>
+    <message>
+        <source>before depth (pixels)</source>
+        <translation>vor der Tiefe (Pixel)</translation>
+    </message>
+    <message>
+        <source>Of the last two seconds: jitter without filters and, at rest, with those in force, mm rms; and how far the filters lag behind, ms, while a marker moves.</source>
+        <translation>Der letzten zwei Sekunden: Jitter ohne Filter und, in Ruhe, mit den geltenden, mm rms; und wie weit die Filter nachhinken, ms, während sich ein Marker bewegt.</translation>
+    </message>
+    <message>
+        <source>Jitter, mm, and lag, ms, of now</source>
+        <translation>Jitter [mm], Verzug [ms], jetzt</translation>
+    </message>
+    <message>
+        <source>How much a marker may jitter at rest, rms.</source>
+        <translation>Wie stark ein Marker in Ruhe zittern darf, rms.</translation>
+    </message>
+    <message>
+        <source>How far a fast marker may lag behind.</source>
+        <translation>Wie weit ein schneller Marker nachhinken darf.</translation>
+    </message>
+    <message>
+        <source>There are two filters: one smooths the pixels before distances are computed, the other the positions after it.</source>
+        <translation>Es gibt zwei Filter: Einer glättet die Pixel, bevor Abstände berechnet werden, der andere danach die Orte.</translation>
+    </message>
+    <message>
+        <source>each marker its own settings</source>
+        <translation>jeder Marker mit eigenen Einstellungen</translation>
+    </message>
+    <message>
+        <source>Otherwise all markers get the settings that serve the worst of them.</source>
+        <translation>Sonst bekommen alle Marker die Einstellungen, die dem schlechtesten genügen.</translation>
+    </message>
+    <message>
+        <source>Jitter</source>
+        <translation>Jitter</translation>
+    </message>
+    <message>
+        <source>Lag</source>
+        <translation>Verzögerung</translation>
+    </message>
+    <message>
+        <source>Charts</source>
+        <translation>Diagramme</translation>
     </message>
     <message>
         <source>A hurried figure of eight, 2 m/s at its peak.</source>
@@ -5084,6 +5236,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Den anderen Tracker auswählen, einschalten und dann verbinden.</translation>
     </message>
     <message>
+        <source>poses</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{least_hz:.0f} or more a second</source>
         <translation>{least_hz:.0f} oder mehr pro Sekunde</translation>
     </message>
@@ -5124,8 +5280,16 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>des Trackers um zwei Achsen, {degrees:.0f} Grad Effektivwert</translation>
     </message>
     <message>
+        <source>reach</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>of the finger across its longest way, {enough_m:.0f} mm rms</source>
         <translation>des Fingers über seinen längsten Weg, {enough_m:.0f} mm Effektivwert</translation>
+    </message>
+    <message>
+        <source>speed</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>of the finger, {enough_m_s:.0f} mm/s rms</source>
@@ -5281,7 +5445,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>last bone, to the tip</source>
-        <translation>letzter Knochen, bis zur Spitze</translation>
+        <translation>letzter, bis zur Spitze</translation>
     </message>
     <message>
         <source>{name}: from the middle of one joint to that of the next, finger bent. {usual:.0f} mm in the hand now in use.</source>
@@ -5700,6 +5864,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>noch einmal ansehen: {names}.</translation>
     </message>
     <message>
+        <source>picked</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{names} of {ids} markers</source>
         <translation>{names} von {ids} Markern</translation>
     </message>
@@ -5762,6 +5930,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>Still to be seen in other places: {names}.</source>
         <translation>Noch an anderen Orten zu sehen: {names}.</translation>
+    </message>
+    <message>
+        <source>pictures</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Choose what to click next. The patches are the rig&apos;s colour and the one picked. A tick: enough places and angles were seen; a cross: the colour is another marker&apos;s or the skin&apos;s. Ctrl+Z takes the last click back; clicking a marker anew replaces what was gathered for it.</source>
@@ -5856,6 +6028,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Das lässt sich nicht messen: {reason}.</translation>
     </message>
     <message>
+        <source>distances</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{rows} of {enough} or more</source>
         <translation>{rows} von {enough} oder mehr</translation>
     </message>
@@ -5926,126 +6102,6 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>not seen by both cameras</source>
         <translation>nicht von beiden Kameras gesehen</translation>
-    </message>
-    <message>
-        <source>Hold still</source>
-        <translation>Still halten</translation>
-    </message>
-    <message>
-        <source>Rest the hand before both cameras, then press Record.</source>
-        <translation>Die Hand vor beiden Kameras ruhen lassen, dann Aufnehmen drücken.</translation>
-    </message>
-    <message>
-        <source>Holds still.</source>
-        <translation>Hält still.</translation>
-    </message>
-    <message>
-        <source>Move fast</source>
-        <translation>Schnell bewegen</translation>
-    </message>
-    <message>
-        <source>Press Record, then wave the hand briskly, 20 cm wide.</source>
-        <translation>Aufnehmen drücken, dann die Hand flott winken, 20 cm weit.</translation>
-    </message>
-    <message>
-        <source>Waves briskly.</source>
-        <translation>Winkt flott.</translation>
-    </message>
-    <message>
-        <source>Record both movements first.</source>
-        <translation>Zuerst beide Bewegungen aufnehmen.</translation>
-    </message>
-    <message>
-        <source>Trying filters …</source>
-        <translation>Filter werden ausprobiert …</translation>
-    </message>
-    <message>
-        <source>markers that both cameras have seen so far</source>
-        <translation>Marker, die beide Kameras bisher gesehen haben</translation>
-    </message>
-    <message>
-        <source>Both cameras have not seen {names}.</source>
-        <translation>Nicht von beiden Kameras gesehen: {names}.</translation>
-    </message>
-    <message>
-        <source>of the time at rest that is needed</source>
-        <translation>der nötigen Zeit in Ruhe</translation>
-    </message>
-    <message>
-        <source>It moves: rest the hand on something.</source>
-        <translation>Sie bewegt sich: die Hand auf etwas auflegen.</translation>
-    </message>
-    <message>
-        <source>Good, hold still.</source>
-        <translation>Gut, still halten.</translation>
-    </message>
-    <message>
-        <source>The hand moved: rest it on something.</source>
-        <translation>Die Hand hat sich bewegt: sie auf etwas auflegen.</translation>
-    </message>
-    <message>
-        <source>of {brisk_m_s:.1f} m/s, the fastest marker of the last two seconds</source>
-        <translation>von {brisk_m_s:.1f} m/s, der schnellste Marker der letzten zwei Sekunden</translation>
-    </message>
-    <message>
-        <source>of the time at that speed that is needed</source>
-        <translation>der nötigen Zeit bei diesem Tempo</translation>
-    </message>
-    <message>
-        <source>Faster, 20 cm wide.</source>
-        <translation>Schneller, 20 cm weit.</translation>
-    </message>
-    <message>
-        <source>The hand was too slow.</source>
-        <translation>Die Hand war zu langsam.</translation>
-    </message>
-    <message>
-        <source>after depth (positions)</source>
-        <translation>nach der Tiefe (Orte)</translation>
-    </message>
-    <message>
-        <source>before depth (pixels)</source>
-        <translation>vor der Tiefe (Pixel)</translation>
-    </message>
-    <message>
-        <source>Of the last two seconds: jitter without filters and, at rest, with those in force, mm rms; and how far the filters lag behind, ms, while a marker moves.</source>
-        <translation>Der letzten zwei Sekunden: Jitter ohne Filter und, in Ruhe, mit den geltenden, mm rms; und wie weit die Filter nachhinken, ms, während sich ein Marker bewegt.</translation>
-    </message>
-    <message>
-        <source>Jitter, mm, and lag, ms, of now</source>
-        <translation>Jitter, mm, und Verzögerung, ms, von jetzt</translation>
-    </message>
-    <message>
-        <source>How much a marker may jitter at rest, rms.</source>
-        <translation>Wie stark ein Marker in Ruhe zittern darf, rms.</translation>
-    </message>
-    <message>
-        <source>How far a fast marker may lag behind.</source>
-        <translation>Wie weit ein schneller Marker nachhinken darf.</translation>
-    </message>
-    <message>
-        <source>There are two filters: one smooths the pixels before distances are computed, the other the positions after it.</source>
-        <translation>Es gibt zwei Filter: Einer glättet die Pixel, bevor Abstände berechnet werden, der andere danach die Orte.</translation>
-    </message>
-    <message>
-        <source>each marker its own settings</source>
-        <translation>jeder Marker mit eigenen Einstellungen</translation>
-    </message>
-    <message>
-        <source>Otherwise all markers get the settings that serve the worst of them.</source>
-        <translation>Sonst bekommen alle Marker die Einstellungen, die dem schlechtesten genügen.</translation>
-    </message>
-    <message>
-        <source>Jitter</source>
-        <translation>Jitter</translation>
-    </message>
-    <message>
-        <source>Lag</source>
-        <translation>Verzögerung</translation>
-    </message>
-    <message>
-        <source>Charts</source>
-        <translation>Diagramme</translation>
     </message>
     <message>
         <source>Learn the empty scene and your hand first.</source>
@@ -6389,7 +6445,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>{counted} across</source>
-        <translation>{counted} waagerecht</translation>
+        <translation>{counted} quer</translation>
     </message>
     <message>
         <source>Rows of circles</source>
@@ -6397,7 +6453,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>{counted} down</source>
-        <translation>{counted} senkrecht</translation>
+        <translation>{counted} hoch</translation>
     </message>
     <message>
         <source>{parent}: cannot be made ({strerror}), so there is no board to print.</source>
@@ -6418,6 +6474,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>Go back: something was not recorded yet.</source>
         <translation>Zurückgehen: Etwas wurde noch nicht aufgenommen.</translation>
+    </message>
+    <message>
+        <source>taken</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>{count} of {wanted}</source>
@@ -6546,6 +6606,10 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
         <translation>Aufgenommen. Weiter oder noch einmal aufnehmen.</translation>
     </message>
     <message>
+        <source>time</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>of {seconds:.0f} s recorded</source>
         <translation>von {seconds:.0f} s aufgenommen</translation>
     </message>
@@ -6564,6 +6628,14 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     <message>
         <source>Space. Begins or ends the recording; it ends by itself when the time is over.</source>
         <translation>Leertaste. Beginnt oder beendet die Aufnahme; sie endet von selbst, wenn die Zeit um ist.</translation>
+    </message>
+    <message>
+        <source>before</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>after</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Restore the old one</source>
@@ -6758,8 +6830,16 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
         <translation>vom oberen zum unteren Rand</translation>
     </message>
     <message>
+        <source>size</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>near enough to fill much of the picture</source>
         <translation>nah genug, um einen großen Teil des Bildes zu füllen</translation>
+    </message>
+    <message>
+        <source>skew</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>tilted, which tells the focal length</source>
@@ -6780,6 +6860,10 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     <message>
         <source>Show the whole board to the camera.</source>
         <translation>Der Kamera das ganze Brett zeigen.</translation>
+    </message>
+    <message>
+        <source>picture</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>parts of the picture in which corners were seen</source>

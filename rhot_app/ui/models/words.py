@@ -177,7 +177,7 @@ NAMES: Final = (
     tr_noop("left"), tr_noop("right"), tr_noop("red"), tr_noop("green"), tr_noop("blue"), tr_noop("yellow"),
     tr_noop("magenta"), tr_noop("cyan"), tr_noop("orange"), tr_noop("white"), tr_noop("black"),
     tr_noop("free"), tr_noop("disc"), tr_noop("sphere"), tr_noop("capsule"), tr_noop("band"), tr_noop("blob"),
-    tr_noop("landmark"))
+    tr_noop("landmark"), tr_noop("skin"), tr_noop("squares"), tr_noop("tags"), tr_noop("spacings"))
 """Fingers, markers, cameras and colours as the shipped files name them; `tr` knows no others, and leaves them."""
 
 HANDS: Final = {

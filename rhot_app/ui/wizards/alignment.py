@@ -121,7 +121,8 @@ class SourceStep(Step):
         if not self.feed.opened:
             return StepView(tr("Choose the other tracker, switch it on, then connect."))
         rate_hz = self.feed.rate_hz
-        bars = (Bar("poses", min(rate_hz / LEAST_HZ, 1.0), tr("{least_hz:.0f} or more a second", least_hz=LEAST_HZ)),)
+        bars = (Bar(tr("poses"), min(rate_hz / LEAST_HZ, 1.0),
+                    tr("{least_hz:.0f} or more a second", least_hz=LEAST_HZ)),)
         if rate_hz >= LEAST_HZ:
             return StepView(tr("{rate_hz:.0f} poses a second. Go on.", rate_hz=rate_hz), done=True, bars=bars,
                             hint=self.feed.notice)
@@ -234,9 +235,9 @@ def bars_of(coverage: Coverage | None) -> tuple[Bar, ...]:
         coverage.speed_m_s / ENOUGH_M_S)
     return (Bar(tr("turn"), min(turn, 1.0),
                 tr("of the tracker about two axes, {degrees:.0f} degrees rms", degrees=np.degrees(ENOUGH_RAD))),
-            Bar("reach", min(reach, 1.0),
+            Bar(tr("reach"), min(reach, 1.0),
                 tr("of the finger across its longest way, {enough_m:.0f} mm rms", enough_m=1000.0 * ENOUGH_M)),
-            Bar("speed", min(speed, 1.0),
+            Bar(tr("speed"), min(speed, 1.0),
                 tr("of the finger, {enough_m_s:.0f} mm/s rms", enough_m_s=1000.0 * ENOUGH_M_S)))
 
 

@@ -134,7 +134,7 @@ class DistanceStep(Step):
 
     def view(self) -> StepView:
         """What to do next, and how many distances there are."""
-        bars = (Bar("distances", min(len(self.rows) / ENOUGH, 1.0),
+        bars = (Bar(tr("distances"), min(len(self.rows) / ENOUGH, 1.0),
                     tr("{rows} of {enough} or more", rows=len(self.rows), enough=ENOUGH)),
                 Bar(tr("spread"), self._spread(), tr("from near to far: the farthest three times the nearest")))
         enough = all(bar.full for bar in bars)

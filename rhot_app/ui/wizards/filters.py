@@ -170,7 +170,7 @@ class _Visibility:
 
     def bar(self) -> Bar:
         """How many of them."""
-        return Bar("markers", float(self._seen.mean()) if len(self._seen) else 0.0,
+        return Bar(tr("markers"), float(self._seen.mean()) if len(self._seen) else 0.0,
                    tr("markers that both cameras have seen so far"))
 
     def shortfall(self) -> str:
@@ -194,7 +194,7 @@ class StillGuide:
 
     def bars(self) -> tuple[Bar, ...]:
         """How much of the time the hand was at rest, and the markers in sight."""
-        return Bar("still", self._still.share, tr("of the time at rest that is needed")), self._visibility.bar()
+        return Bar(tr("still"), self._still.share, tr("of the time at rest that is needed")), self._visibility.bar()
 
     def sentence(self) -> str:
         """Rest it, or go on so."""
@@ -226,9 +226,10 @@ class FastGuide:
 
     def bars(self) -> tuple[Bar, ...]:
         """The speed, how much of the time it was enough, and the markers in sight."""
-        return (Bar("speed", self._share,
+        return (Bar(tr("speed"), self._share,
                     tr("of {brisk_m_s:.1f} m/s, the fastest marker of the last two seconds", brisk_m_s=BRISK_M_S)),
-                Bar("fast", self._fast.share, tr("of the time at that speed that is needed")), self._visibility.bar())
+                Bar(tr("fast"), self._fast.share, tr("of the time at that speed that is needed")),
+                self._visibility.bar())
 
     def sentence(self) -> str:
         """Faster, or go on so."""
@@ -245,7 +246,7 @@ def _text(value: float, decimals: int) -> str:
 
 # -- the pages of the filter wizard ------------------------------------------------------------------------------------
 
-_HEADS = ("", "raw", "filtered", "lag")
+_HEADS = ("", tr_noop("raw"), tr_noop("filtered"), tr_noop("lag"))
 _ROW_PX = 26
 _STAGES = (("position", tr_noop("after depth (positions)")), ("pixel", tr_noop("before depth (pixels)")))
 

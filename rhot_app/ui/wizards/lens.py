@@ -62,8 +62,8 @@ _VOUCHED_S = 0.03  # a person who presses Space says that the board has not move
 _CELL_FULL = 12  # corners in a part of the picture that tint it wholly
 _BARS = {"x": ("X", tr_noop("from the left to the right edge")),
          "y": ("Y", tr_noop("from the upper to the lower edge")),
-         "size": ("size", tr_noop("near enough to fill much of the picture")),
-         "skew": ("skew", tr_noop("tilted, which tells the focal length"))}
+         "size": (tr_noop("size"), tr_noop("near enough to fill much of the picture")),
+         "skew": (tr_noop("skew"), tr_noop("tilted, which tells the focal length"))}
 
 
 class LensBoardStep(BoardStep):
@@ -193,7 +193,7 @@ class LensShowStep(FilmedStep):
             self._covered = count, self._guide.coverage, self._guide.complete
         _, coverage, complete = self._covered
         bars = [Bar(_BARS[key][0], share, _BARS[key][1]) for key, share in coverage.bars.items()]
-        bars.append(Bar("picture", min(coverage.share / 0.7, 1.0),
+        bars.append(Bar(tr("picture"), min(coverage.share / 0.7, 1.0),
                         tr("parts of the picture in which corners were seen")))
         overlay: Overlay = (Cells(coverage.cells / _CELL_FULL),)
         annotated = self.search.annotated(self.board)

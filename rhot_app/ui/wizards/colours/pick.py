@@ -174,7 +174,7 @@ class PickStep(Step):
         """Which paint to show next, and how much has been seen of those named."""
         names, gathering = self.gathering.names, self.gathering
         seen = sum(gathering.variety(name) for name in names) / len(names) if names else 0.0
-        bars = (Bar("picked", len(names) / len(self.base.ids),
+        bars = (Bar(tr("picked"), len(names) / len(self.base.ids),
                     tr("{names} of {ids} markers", names=len(names), ids=len(self.base.ids))),
                 Bar(tr("seen moving"), seen, tr("places and angles at which the markers were seen so far")))
         return StepView(self._sentence(),
@@ -228,7 +228,7 @@ class PickPage(Page):
         super().__init__(step)
         self._picks = step
         self.pickable = self.one_large = True
-        self.list = PaintList(scheme, ("marker", "pictures"))
+        self.list = PaintList(scheme, (tr_noop("marker"), tr_noop("pictures")))
         self.list.setToolTip(tr("Choose what to click next. The patches are the rig's colour and the one picked. A "
                                 "tick: enough places and angles were seen; a cross: the colour is another marker's or "
                                 "the skin's. Ctrl+Z takes the last click back; clicking a marker anew replaces what "
@@ -275,7 +275,7 @@ class PickPage(Page):
         gathering = self._picks.gathering
         if name == SKIN:
             count = len(gathering.skin)
-            return PaintRow(name, None, "tick" if count else "ring", "picked" if count else tr("not picked"))
+            return PaintRow(name, None, "tick" if count else "ring", tr("picked") if count else tr("not picked"))
         index = self._picks.base.ids.index(name)
         before, now = (markers.markers[index].display_rgb for markers in (self._picks.base, self._picks.markers))
         if name not in gathering.names:

@@ -236,7 +236,7 @@ class BoardStep(Step):
             return StepView(tr("Count the corners again."), hint=f"{wrong.figure} {wrong.cause}", annotated=annotated)
         if self._fields.square_mm is None:
             hint = " ".join(filter(None, (tr(UNMEASURED), self._hint())))
-            return StepView(tr("Measure the {parts} and type their size.", parts=self.board.parts), hint=hint,
+            return StepView(tr("Measure the {parts} and type their size.", parts=tr(self.board.parts)), hint=hint,
                             annotated=annotated)
         return StepView(self._sentence(found), done=search.recognised, passable=True,
                         hint=self._hint(), annotated=annotated)

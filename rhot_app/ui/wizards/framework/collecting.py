@@ -81,5 +81,5 @@ class MeasurementStep(Step):
         """How many there are."""
         count, wanted = len(self.found), self._what.count
         return StepView(tr("Enough: press Next.") if count >= wanted else self._what.sentence, done=count >= wanted,
-                        bars=(Bar("taken", count / wanted, tr("{count} of {wanted}", count=count, wanted=wanted)),),
+                        bars=(Bar(tr("taken"), count / wanted, tr("{count} of {wanted}", count=count, wanted=wanted)),),
                         kept=count)

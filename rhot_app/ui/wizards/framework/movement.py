@@ -132,7 +132,7 @@ class MovementStep(Step):
     def _bars(self, elapsed_s: float) -> tuple[Bar, ...]:
         done = {"recording": min(elapsed_s / self.seconds, 1.0), "ending": 1.0, "recorded": 1.0}.get(self.phase, 0.0)
         guide = self._guide.bars() if self._guide is not None else ()
-        return (Bar("time", done, tr("of {seconds:.0f} s recorded", seconds=self.seconds)), *guide)
+        return (Bar(tr("time"), done, tr("of {seconds:.0f} s recorded", seconds=self.seconds)), *guide)
 
 
 class QuietGuide:
@@ -151,7 +151,7 @@ class QuietGuide:
 
     def bars(self) -> tuple[Bar, ...]:
         """The markers that are measured now."""
-        return (Bar("markers", self._seen, tr("markers measured by the cameras at this moment")),)
+        return (Bar(tr("markers"), self._seen, tr("markers measured by the cameras at this moment")),)
 
     def sentence(self) -> str:
         """The one sentence."""

@@ -34,7 +34,7 @@ from rhot_app.ui.common.disposal import plot_widget
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.common.theme import CELL_PADDING_PX, app_font
-from rhot_app.ui.language import tr
+from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme, visible_on
 from rhot_app.ui.models.proposal import ways_back
 from rhot_app.ui.models.words import GRADES
@@ -78,7 +78,7 @@ class Page(QWidget):
 
 # -- Last page of every wizard: before and after -----------------------------------------------------------------------
 
-HEADS = ("", "before", "after")
+HEADS = ("", tr_noop("before"), tr_noop("after"))
 
 
 class AcceptPage(Page):
