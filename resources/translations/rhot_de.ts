@@ -2067,19 +2067,19 @@ http://192.168.1.20:8080/video oder rtsp://192.168.1.21/live</translation>
     </message>
     <message>
         <source>skin</source>
-        <translation type="unfinished"></translation>
+        <translation>Haut</translation>
     </message>
     <message>
         <source>squares</source>
-        <translation type="unfinished"></translation>
+        <translation>Felder</translation>
     </message>
     <message>
         <source>tags</source>
-        <translation type="unfinished"></translation>
+        <translation>Tags</translation>
     </message>
     <message>
         <source>spacings</source>
-        <translation type="unfinished"></translation>
+        <translation>Abstände</translation>
     </message>
     <message>
         <source>left hand</source>
@@ -4729,7 +4729,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>markers</source>
-        <translation type="unfinished"></translation>
+        <translation>Marker</translation>
     </message>
     <message>
         <source>markers that both cameras have seen so far</source>
@@ -4777,15 +4777,15 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>raw</source>
-        <translation type="unfinished"></translation>
+        <translation>roh</translation>
     </message>
     <message>
         <source>filtered</source>
-        <translation type="unfinished"></translation>
+        <translation>gefiltert</translation>
     </message>
     <message>
         <source>lag</source>
-        <translation type="unfinished"></translation>
+        <translation>Verzug</translation>
     </message>
     <message>
         <source>after depth (positions)</source>
@@ -5237,7 +5237,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>poses</source>
-        <translation type="unfinished"></translation>
+        <translation>Posen</translation>
     </message>
     <message>
         <source>{least_hz:.0f} or more a second</source>
@@ -5281,7 +5281,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>reach</source>
-        <translation type="unfinished"></translation>
+        <translation>Reichweite</translation>
     </message>
     <message>
         <source>of the finger across its longest way, {enough_m:.0f} mm rms</source>
@@ -5289,7 +5289,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>speed</source>
-        <translation type="unfinished"></translation>
+        <translation>Tempo</translation>
     </message>
     <message>
         <source>of the finger, {enough_m_s:.0f} mm/s rms</source>
@@ -5865,7 +5865,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>picked</source>
-        <translation type="unfinished"></translation>
+        <translation>aufgenommen</translation>
     </message>
     <message>
         <source>{names} of {ids} markers</source>
@@ -5933,7 +5933,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>pictures</source>
-        <translation type="unfinished"></translation>
+        <translation>Bilder</translation>
     </message>
     <message>
         <source>Choose what to click next. The patches are the rig&apos;s colour and the one picked. A tick: enough places and angles were seen; a cross: the colour is another marker&apos;s or the skin&apos;s. Ctrl+Z takes the last click back; clicking a marker anew replaces what was gathered for it.</source>
@@ -6029,7 +6029,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>distances</source>
-        <translation type="unfinished"></translation>
+        <translation>Abstände</translation>
     </message>
     <message>
         <source>{rows} of {enough} or more</source>
@@ -6477,7 +6477,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>taken</source>
-        <translation type="unfinished"></translation>
+        <translation>Aufnahmen</translation>
     </message>
     <message>
         <source>{count} of {wanted}</source>
@@ -6607,7 +6607,7 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     </message>
     <message>
         <source>time</source>
-        <translation type="unfinished"></translation>
+        <translation>Zeit</translation>
     </message>
     <message>
         <source>of {seconds:.0f} s recorded</source>
@@ -6631,11 +6631,11 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     </message>
     <message>
         <source>before</source>
-        <translation type="unfinished"></translation>
+        <translation>vorher</translation>
     </message>
     <message>
         <source>after</source>
-        <translation type="unfinished"></translation>
+        <translation>nachher</translation>
     </message>
     <message>
         <source>Restore the old one</source>
@@ -6831,7 +6831,7 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     </message>
     <message>
         <source>size</source>
-        <translation type="unfinished"></translation>
+        <translation>Größe</translation>
     </message>
     <message>
         <source>near enough to fill much of the picture</source>
@@ -6839,7 +6839,7 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     </message>
     <message>
         <source>skew</source>
-        <translation type="unfinished"></translation>
+        <translation>Neigung</translation>
     </message>
     <message>
         <source>tilted, which tells the focal length</source>
@@ -6863,7 +6863,7 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     </message>
     <message>
         <source>picture</source>
-        <translation type="unfinished"></translation>
+        <translation>Bild</translation>
     </message>
     <message>
         <source>parts of the picture in which corners were seen</source>
