@@ -63,7 +63,7 @@ def case(background: str, bare: bool, frames: int, kinds: list[str], folder: Pat
         ids = scene.markers.ids
         missing = frozenset(ids if bare else (ids[seed % len(ids)],))
         order = Order(scene, MOTIONS[seed % len(MOTIONS)], SECONDS, unpainted=missing)
-        filmed = data_set(order, folder)
+        filmed = data_set(order, folder, anew=True)
         for kind in kinds:
             counts[kind] += tally(filmed, missing, kind)
         filmed_frames += 2 * round(SECONDS * scene.preset.fps)

@@ -105,7 +105,7 @@ def main() -> int:
     rows = []
     try:
         for motion in args.motions.split(","):
-            takes = [data_set(order, data_sets_folder(), lambda title: ProgressLine(f"filming {title}"))
+            takes = [data_set(order, data_sets_folder(), lambda title: ProgressLine(f"filming {title}"), anew=True)
                      for order in orders(make_scene(twin_defaults(), 1), [motion], range(1, args.seeds + 1),
                                          args.seconds, sketched=args.sketched)]
             markers = compile_markers(takes[0].rig)

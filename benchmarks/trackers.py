@@ -89,7 +89,8 @@ class Bench:
         settings = msgspec.structs.replace(twin_defaults(), markers=self.markers)
         for seed in self.seeds if seeds is None else seeds:
             order = Order(make_scene(settings, seed), motion, seconds or self.seconds, sketched=self.sketched)
-            yield data_set(order, self.folder, lambda title: ProgressLine(f"filming {title}"))
+            yield data_set(order, self.folder, lambda title: ProgressLine(f"filming {title}"),
+                           anew=self.folder == data_sets_folder())
 
     def each(self, takes: Iterable[DataSet], trial: Callable[[DataSet, Rig], Figures],
              trackers: dict[str, TrackerSettings] = TRACKERS) -> Results:

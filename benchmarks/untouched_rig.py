@@ -84,7 +84,7 @@ def main() -> int:
     try:
         for motion in args.motions.split(","):
             order = Order(make_scene(twin_defaults(), args.seed), motion, 60.0 * args.minutes, sketched=args.sketched)
-            take = data_set(order, data_sets_folder(), lambda title: ProgressLine(f"filming {title}"))
+            take = data_set(order, data_sets_folder(), lambda title: ProgressLine(f"filming {title}"), anew=True)
             found[motion] = study(take, args.seed)
     except RhotError as exc:
         print(exc, file=sys.stderr)

@@ -2,7 +2,7 @@
 
 Trackers are compared on takes: the same datagrams for every one of them, as often as wanted, without waiting. What was
 filmed once is kept in a folder and found again by its order. What films may have changed meanwhile: the log
-says so, and whoever shows figures should (`DataSet.outdated`); remove the folder to film anew.
+says so, and whoever shows figures should (`DataSet.outdated`), or film anew.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import functools
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -102,19 +103,26 @@ def data_sets_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhot" / "takes"
 
 
-def data_set(order: Order, folder: Path, watch: Watch = lambda title: None) -> DataSet:
+def data_set(order: Order, folder: Path, watch: Watch = lambda title: None, *, anew: bool = False) -> DataSet:
     """The take in `folder`, filmed unless it is there already. Raises RhotError.
 
-    Filming takes about as long as what is filmed; an interrupted one leaves nothing behind.
+    Filming takes about as long as what is filmed; an interrupted one leaves nothing behind. `anew`: an outdated take is
+    filmed anew, for figures of today's detector and twin.
     """
     folder.mkdir(parents=True, exist_ok=True)
     place = folder / order.name()
+    if anew and place.exists() and _recorded(order, place).outdated:
+        shutil.rmtree(place)
     if not place.exists():
         try:
             _film(order, place, watch(order.title))
         except OSError:
             if not place.exists():  # else somebody has filmed the same meanwhile
                 raise
+    return _recorded(order, place)
+
+
+def _recorded(order: Order, place: Path) -> DataSet:
     reader = LogReader(place / LOG_NAME)
     reader.close()
     return DataSet(place, reader.rig, order.seconds, reader.about.get("sources") != _source_digest(order.sketched))

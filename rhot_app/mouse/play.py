@@ -152,7 +152,7 @@ class _Played:
 
 def _markers(set_up: SetUp, scene: Scene, motion: Path, seconds: float, blocked_s: float, watch: Watch) -> _Played:
     order = Order(scene, str(motion), seconds, sketched=not set_up.pictures)
-    data = data_set(order, data_sets_folder() if set_up.pictures else motion.parent / "sets", watch)
+    data = data_set(order, data_sets_folder() if set_up.pictures else motion.parent / "sets", watch, anew=True)
     truth, rig = data.truth, tracked_rig(data.rig, set_up, scene)
     second = data.rig.nodes[1].node_id
     records = [one for one in data.records() if one.node_id != second or one.kind is not RecordKind.DATAGRAM

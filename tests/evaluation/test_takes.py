@@ -100,6 +100,9 @@ def test_a_sketch_that_other_sources_made_is_outdated(
     takes._source_digest.cache_clear()
     try:
         assert data_set(order, tmp_path).outdated is outdated
+        told: list[str] = []
+        assert not data_set(order, tmp_path, told.append, anew=True).outdated
+        assert bool(told) is outdated, "what is not outdated is not filmed twice"
     finally:
         takes._source_digest.cache_clear()
 
