@@ -72,6 +72,7 @@ def style_sheet(s: Scheme) -> str:
     QToolBar {{ background: {s.panel}; border: none; border-bottom: 1px solid {s.border}; padding: 4px 8px;
         spacing: 4px; }}
     QToolBar #qt_toolbar_ext_button, #qt_menubar_ext_button {{ padding: 0; border: none; }}
+    #controls {{ border: none; padding: 0; }}
     QMenuBar {{ background: transparent; border: none; }}
     QMenuBar::item {{ background: transparent; padding: 6px 12px; border: 1px solid transparent; border-radius: 6px; }}
     QMenuBar::item:selected {{ background: {s.raised}; }}

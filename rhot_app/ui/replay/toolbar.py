@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton,
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.shapes import show_overflow
 from rhot_app.ui.dialogs.recordings import BookmarkDialog
 from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
@@ -40,21 +41,25 @@ class ReplayToolBar(QToolBar):
         self.pictures.setCheckable(True)
         self.remove = self._action(tr("Remove the bookmark here"),
                                    tr("Remove the bookmark at which the recording stands."))
-        self.bookmarks_button, self.menu = QToolButton(), QMenu(self)
-        self.bookmarks_button.setText(tr("Bookmarks"))
-        self.bookmarks_button.setToolTip(tr("Moments that were marked, while recording or here; choose one to go "
-                                            "there."))
-        self.bookmarks_button.setMenu(self.menu)
-        self.bookmarks_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.menu = QMenu(tr("Bookmarks"), self)
+        self.menu.menuAction().setToolTip(tr("Moments that were marked, while recording or here; choose one to go "
+                                             "there."))
         self.badge = StateBadge(scheme)
         self.addWidget(self.word)
         self.addWidget(self.name)
         self.addSeparator()
-        self.addActions([self.open, self.again, self.compare, self.alone, self.export, self.trim, self.pictures])
-        self.addWidget(self.bookmarks_button)
-        spacer = QWidget()
-        spacer.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self.addWidget(spacer)
+        self.controls = QToolBar(self)  # what does not fit stands behind its arrow, and the state stays in sight
+        self.controls.setObjectName("controls")
+        self.controls.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self.controls.addActions([self.open, self.again, self.compare, self.alone, self.export, self.trim,
+                                  self.pictures, self.menu.menuAction()])
+        button = self.controls.widgetForAction(self.menu.menuAction())
+        assert isinstance(button, QToolButton)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.addWidget(self.controls)
+        margins = self.controls.layout()
+        assert margins is not None
+        margins.setContentsMargins(0, 0, 0, 0)  # it took those of a toolbar that stands alone
         self.addWidget(self.badge)
         self.set_scheme(scheme)
         self.show_replay(None)
@@ -69,6 +74,7 @@ class ReplayToolBar(QToolBar):
         self.word.setStyleSheet(f"background: {scheme.accent}; color: {scheme.on_accent}; border-radius: 6px; "
                                 "padding: 4px 10px; font-weight: 700;")
         self.badge.set_scheme(scheme)
+        show_overflow(self.controls, scheme.text)
 
     def show_replay(self, replay: Replay | None) -> None:
         """Another recording, another run, or other bookmarks."""
@@ -78,7 +84,7 @@ class ReplayToolBar(QToolBar):
         for action in (self.again, self.compare, self.export, self.trim, self.pictures):
             action.setEnabled(replay is not None)
         self.alone.setVisible(replay is not None and replay.second is not None)
-        self.bookmarks_button.setEnabled(replay is not None)
+        self.menu.menuAction().setEnabled(replay is not None)
         self.menu.clear()
         for mark in replay.bookmarks if replay is not None else ():
             assert replay is not None

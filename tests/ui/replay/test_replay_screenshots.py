@@ -61,6 +61,12 @@ def test_the_replay(themed, recordings, tmp_path):
     window.seek(7.6 * PART)
     person.until(lambda: window.parts.scene.state is not None and window.parts.pacer.cost_s > 0.0)
     window.parts.scene.frame_hand()
+    badge = window.toolbar.badge
+    for width in (1024, SIZE.width()):
+        window.resize(width, SIZE.height())
+        person.until(lambda width=width: window.width() == width and badge.isVisible()
+                     and badge.mapTo(window, badge.rect().topRight()).x() < width)
+    assert window.toolbar.height() <= badge.height() + 16
     person.keep("replay", 60)
     window.close()
     window.deleteLater()
