@@ -11,17 +11,21 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tables import arguments, publish, table
 
 from rhot_app.project import Rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
 from rhot_node.clock import NodeClock
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import ClockReply, MarkerObservation, NodeState, Observations
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from synthetic_node import synthetic_rig
 
 SESSION = 7
 FRAME_NS = 10_000_000

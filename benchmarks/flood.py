@@ -14,13 +14,13 @@ import socket
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 from tables import arguments, publish, table
 
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.engine.serve import prepare_process
 from rhot_app.project import Rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.receiver import NodeReceiver, open_data_socket
 from rhot_app.sources.validation import DatagramValidator
@@ -28,6 +28,10 @@ from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import MarkerObservation, Observations
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from synthetic_node import synthetic_rig
 
 SESSION = 11
 _TICK_S = 0.002

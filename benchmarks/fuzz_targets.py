@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import socket
+import sys
+from pathlib import Path
 from typing import Protocol
 
 import msgspec
@@ -10,7 +12,6 @@ import numpy as np
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.project import Rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.validation import OLDEST_FRAME_NS
 from rhot_app.tracking.kinds.edges import REMEMBERED
@@ -48,6 +49,10 @@ from rhot_node.wire.messages import (
     TrustState,
 )
 from rhot_node.wire.search import SLICES_MAX, pack_edges, pack_map, pack_slices
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from synthetic_node import synthetic_rig
 
 NOW_NS = 5 * 10**12
 SLACK_NS = 5_000_000

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -22,10 +23,13 @@ from tables import arguments, publish, table
 from rhot_app.hand.anatomy import FingerAnatomy, HandAnatomy
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.project import Rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.tracking.locate import Located
 from rhot_app.tracking.markers.hand_size import GRID, HandSize
 from rhot_app.tracking.markers.marker_model import USUAL_SIZE_SD, MarkerModel, compile_markers
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from synthetic_node import synthetic_rig
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
     python benchmarks/landmarks.py [--data ../shared/data/bare_hand_stereo] [--unit-mm 38.5] [--seeds 2] [--json FILE]
 
 First the recorded hand, if it is there: the errors of its landmarks about the hand that fits them (the source of
-`simulator.nodes.landmark_detector.LandmarkErrors`), then reprojection, jitter and lag of the tracked hand against
+`tests/landmark_detector.py`: `LandmarkErrors`), then reprojection, jitter and lag of the tracked hand against
 plain triangulation of the same landmarks, and how near its joints are to triangulation with other values of NOISE_M,
 which is chosen by the frames from 13 to 66 and judged by those from 67 to 119. The recording's unit of length is
 unknown: `--unit-mm` makes its hand as large as the rig's.
@@ -26,8 +26,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from tables import arguments, publish, table
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "tests" / "recording")]
+TESTS = Path(__file__).resolve().parents[1] / "tests"
+sys.path[:0] = [str(TESTS), str(TESTS / "recording")]
 
+from landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand  # noqa: E402
 from recorded_landmarks import FITTED, JUDGED, recording  # noqa: E402
 
 from rhot_app.calibration.hand.bundle_model import POSE, expected  # noqa: E402
@@ -42,7 +44,6 @@ from rhot_app.hand.anatomy import load_hand  # noqa: E402
 from rhot_app.hand.skeleton import JOINTS  # noqa: E402
 from rhot_app.project import CameraPose, Intrinsics, Rig, RigNode, TrackerSettings  # noqa: E402
 from rhot_app.recording.landmark_log import LandmarkTable, read_landmark_table, write_landmark_log  # noqa: E402
-from rhot_app.simulator.nodes.landmark_detector import EPOCH_NS, detected_landmarks, landmark_rig, moving_hand  # noqa: E402
 from rhot_app.state import HandState  # noqa: E402
 from rhot_app.tracking.markers import acquisition, marker_residual  # noqa: E402
 from rhot_app.tracking.scene import make_tracker  # noqa: E402

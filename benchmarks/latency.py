@@ -25,9 +25,12 @@ from tables import arguments, publish, table
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import StartedProcess, end_processes, ensure_engine, start_ticks, stop_engine
 from rhot_app.project import OutputSettings, Rig, load_rig, save_rig
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.state import LATENCY_STAGES, HandState
 from rhot_node.clock import NodeClock
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from synthetic_node import SyntheticNode, synthetic_rig
 
 SETTLE_S = 2.0
 

@@ -20,7 +20,10 @@ from tables import arguments, publish, table
 
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from synthetic_node import synthetic_rig
 
 RECORDS = 10_000
 

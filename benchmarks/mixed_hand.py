@@ -5,7 +5,7 @@
 A hand is drawn before a wall, at rest until it is found and then moving, and tracked live by the nodes' search of the
 pictures, by its markers, and by both. The cases are `fingertips`, a painted thumb and index finger on a hand that is
 bare otherwise, and `landmarks`, what a detector reports of 21 joints with the measured errors
-(`simulator.nodes.landmark_detector`). In a case with `-file` the hand is as its file says. Otherwise the drawn hand's
+(`tests/landmark_detector.py`). In a case with `-file` the hand is as its file says. Otherwise the drawn hand's
 bones are off by 5 % and its radii by 8 %, before clutter, and the size is estimated.
 
 All start from the true pose of the hand at rest; with `--found`, markers from what they find and contours from a pose
@@ -37,6 +37,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")
 
 from bare_hand import CHI2_3, MOTIONS, mistaken  # noqa: E402
 from bare_scenes import DISTANCE_M, near, rig_of  # noqa: E402
+from landmark_detector import Hand, detected_landmarks  # noqa: E402
 from pictures import picture, two_cameras, wall  # noqa: E402
 from shipped_rig import RIGHT_HAND  # noqa: E402
 
@@ -48,7 +49,6 @@ from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import HandModel, build_model  # noqa: E402
 from rhot_app.hand.skeleton import TIP_ROLES, HandPose  # noqa: E402
 from rhot_app.project import Rig, TrackerSettings  # noqa: E402
-from rhot_app.simulator.nodes.landmark_detector import Hand, detected_landmarks  # noqa: E402
 from rhot_app.simulator.scene.motion_file import load_motion  # noqa: E402
 from rhot_app.state import HandState  # noqa: E402
 from rhot_app.tracking.contours.tracker import ContourEstimator  # noqa: E402

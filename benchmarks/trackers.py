@@ -24,15 +24,16 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+import scenarios
+from fault_injection import EPISODE_S
 from numpy.typing import NDArray
+from scenarios import Results, legend, run_table
 
 from rhot_app.errors import RhotError
 from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation, rotation_from_quaternion
-from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.accuracy import Figures
-from rhot_app.evaluation.compare import TRACKERS, Results, legend, run_table
+from rhot_app.evaluation.compare import TRACKERS
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set, data_sets_folder
-from rhot_app.evaluation.fault_injection import EPISODE_S
 from rhot_app.evaluation.track import rig_with
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.skeleton import TIP_ROLES

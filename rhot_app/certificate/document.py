@@ -41,11 +41,6 @@ class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return Interval(self.value, -math.inf if self.low is None else self.low,
                         math.inf if self.high is None else self.high)
 
-    @property
-    def as_expected(self) -> bool | None:
-        """Whether the interval holds what the figure should be; None when nothing can be said."""
-        return None if self.value is None or self.expected is None else self.interval.holds(self.expected)
-
 
 def figure(name: str, unit: str, interval: Interval, *, expected: float | None = None, thesis: str = "") -> Figure:
     """A figure of an interval that is in `unit` already."""

@@ -25,14 +25,12 @@ from rhot_app.certificate.recordings import (
     StaticStep,
     write_protocol,
 )
-from rhot_app.evaluation.fault_injection import changed, lost
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
-from rhot_app.recording.raw_log import LogReader
 from rhot_app.simulator.film.detected import Sending, detected
 from rhot_app.simulator.film.film import for_each_camera
 from rhot_app.simulator.film.node_log import T0_MASTER_NS, write_node_log
-from rhot_app.simulator.film.points import LOG_NAME, PointNoise, write_points
+from rhot_app.simulator.film.points import PointNoise, PointStream
 from rhot_app.simulator.film.scene_objects import SceneObject
 from rhot_app.simulator.film.shot import Shot, make_shot
 from rhot_app.simulator.render.body import PALM_GROUP, POINT_M, SKIN
@@ -41,7 +39,6 @@ from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, Rigi
 from rhot_app.simulator.scene.scene import Scene, build_rig
 from rhot_app.simulator.scene.scene_description import MarkerShow
 from rhot_app.sources.local_nodes import NodePorts
-from rhot_node.wire.messages import MarkerObservation
 
 Array = NDArray[np.float64]
 
@@ -209,30 +206,12 @@ class _Flashing:
 
 def _record(shot: Shot, path: Path, screen: _Screen | None, *, sketched: bool) -> None:
     rig = simulated_rig(shot.scene)
-    about = {"simulated": shot.scene_object.name}
-    if not sketched:
+    if sketched:
+        streams = [PointStream(shot, rig, index, PointNoise(loss=0.0)) for index in range(len(rig.nodes))]
+        records = [record for stream in streams
+                   for record in (stream.records() if screen is None else stream.records(screen.lit))]
+    else:
         source = None if screen is None else _Flashing(shot.scene_object.source, screen)
-        streams = for_each_camera(shot, functools.partial(detected, Sending(rig, seed=0xCE48), source), None)
-        write_node_log(path, rig, about, [record for records, _ in streams for record in records])
-        return
-    work = path.with_suffix(".points")
-    write_points(shot, work, PointNoise(loss=0.0))
-    reader = LogReader(work / LOG_NAME)
-    records = list(reader)
-    reader.close()
-    for one in (*work.iterdir(), work):
-        one.rmdir() if one.is_dir() else one.unlink()
-    if screen is not None:
-        times_s = [1e-9 * np.array(shot.scene.frame_times_ns(index, shot.seconds)) for index in range(len(rig.nodes))]
-        records = changed(records, functools.partial(_as_lit, shot.scene, times_s, screen))
-    write_node_log(path, rig, about, [record for record in records if record.node_id != 0])
-
-
-def _as_lit(scene: Scene, times_s: list[Array], screen: _Screen, arrival_s: float, node_id: int,
-            seen: list[MarkerObservation]) -> list[MarkerObservation]:
-    """What a node sees of a patch: nothing while it is dark. The frame is the last one that was ready by then."""
-    ready_s = arrival_s - 1e-9 * (0.5 * scene.exposure_ns + scene.row_time_ns * scene.preset.height)
-    mine_s = times_s[node_id - 1]
-    frame_s = float(mine_s[max(int(np.searchsorted(mine_s, ready_s, side="right")) - 1, 0)])
-    return [marker if screen.lit(frame_s + 1e-9 * scene.row_time_ns * marker.y) else lost(marker.index)
-            for marker in seen]
+        said = for_each_camera(shot, functools.partial(detected, Sending(rig, seed=0xCE48), source), None)
+        records = [record for one, _ in said for record in one]
+    write_node_log(path, rig, {"simulated": shot.scene_object.name}, records)

@@ -35,13 +35,6 @@ LOG_NAME: Final = "take.rhotlog"
 Watch = Callable[[str], Progress | None]
 """Says how the filming of a take goes: given what is filmed, who is told of its frames."""
 
-_SHOWN = "body", "motion", "node_log", "raycast", "recorded", "scene"
-_SEEN = (*_SHOWN, "background", "camera_controls", "edges", "lamp", "exposure_samples", "paint", "rays", "render",
-         "sensor", "solids_painter", "scanline_bounds", "trace")
-_SKETCHED = (*_SHOWN, "marker_rows", "ideal_observations")
-"""Modules of the twin that a take depends on besides its order: what moves, makes pictures or does without, and sends
-what was found in them."""
-
 
 @dataclass(frozen=True, eq=False)
 class Order:
@@ -155,12 +148,9 @@ def _motion_digest(motion: str) -> str:
 
 @functools.cache
 def _source_digest(sketched: bool) -> str:
+    """Of the programs that a take depends on besides its order: the twin's, and the detector's if it has pictures."""
     root = Path(__file__).parents[2]
-    digest = hashlib.sha256()
-    simulator = root / "rhot_app" / "simulator"
-    paths = [path for name in (_SKETCHED if sketched else _SEEN) for path in simulator.glob(f"*/{name}.py")]
-    if not sketched:
-        paths += (root / "rhot_node" / "detect").glob("*.py")
-    for path in sorted(paths):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+    folders = [root / "rhot_app" / "simulator" / room for room in ("film", "render", "scene")]
+    folders += [] if sketched else [root / "rhot_node" / "detect"]
+    return hashlib.sha256(b"".join(path.read_bytes() for folder in folders
+                                   for path in sorted(folder.glob("*.py")))).hexdigest()

@@ -20,7 +20,7 @@ from rhot_app.hand.dh import ROOT
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.shape import FLESH
-from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS, THUMB_JOINTS, HandPose
+from rhot_app.hand.skeleton import ANGLES, FINGERS, THUMB_JOINTS, HandPose
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -89,11 +89,6 @@ def openxr_hand(model: HandModel, mapping: OpenXrMap, pose: HandPose) -> OpenXrH
     hand = OpenXrHand(np.empty((len(OPENXR_JOINTS), 3)), np.empty((len(OPENXR_JOINTS), 4)), mapping.radius)
     openxr_arrays(mapping, pose.world_from_palm, frames, hand.positions, hand.orientations)
     return hand
-
-
-def joints_from_openxr(positions: Array) -> Array:
-    """(21, 3) positions in the order of `skeleton.JOINTS`, of 26 in OpenXR's."""
-    return np.asarray(positions[[OUR_JOINTS.index(name) for name in JOINTS]])
 
 
 @njit(cache=True)

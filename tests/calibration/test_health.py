@@ -9,12 +9,12 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from landmark_detector import landmark_rig
 from patience import quickest
 from synthetic_rig import make_rig
 
 from rhot_app.calibration.check.health import HealthMonitor, HealthSample
 from rhot_app.project import CameraCalibration, Rig
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig
 from rhot_node.wire.messages import MarkerFlag
 
 MARKERS = 6

@@ -3,6 +3,7 @@
 import msgspec
 import numpy as np
 import pytest
+from landmark_detector import landmark_rig, moving_hand
 from recorded_landmarks import FITTED, JUDGED, needs_recording, recording
 
 from rhot_app.calibration.hand.bones import solve_bones
@@ -11,7 +12,6 @@ from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.skeleton import FINGERS
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_node.files import resource_path
 
 FPS = 30.0

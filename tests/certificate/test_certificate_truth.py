@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from fault_injection import changed
 from scipy import stats
 from simulated_protocol import SHORT, Recorded, recorded, with_baseline, with_focal_length
 
@@ -20,7 +21,6 @@ from rhot_app.certificate.latency import flash_edges, judge_latency, judge_timin
 from rhot_app.certificate.lengths import DistanceReading, judge_depth, judge_rod
 from rhot_app.certificate.recordings import FlashStep, Latencies, ProtocolFile, StaticStep, read_recording
 from rhot_app.certificate.static import judge_handedness, judge_static, judge_upright
-from rhot_app.evaluation.fault_injection import changed
 from rhot_app.recording.raw_log import LogReader
 from rhot_app.simulator.film.node_log import write_node_log
 from rhot_app.state import LATENCY_STAGES

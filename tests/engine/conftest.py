@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 from processes import forked_programs, fresh_programs  # noqa: F401
+from synthetic_node import SyntheticNode, synthetic_rig
 
 from rhot_app.project import Rig
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 
 
 @pytest.fixture

@@ -7,18 +7,18 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-
-from rhot_app.engine.rig_watch import BONES_JUDGE_NS, BonesWatch
-from rhot_app.engine.status import Advice
-from rhot_app.hand.skeleton import FINGERS
-from rhot_app.project import Rig, parse_rig
-from rhot_app.simulator.nodes.landmark_detector import (
+from landmark_detector import (
     EPOCH_NS,
     LandmarkErrors,
     detected_landmarks,
     landmark_rig,
     moving_hand,
 )
+
+from rhot_app.engine.rig_watch import BONES_JUDGE_NS, BonesWatch
+from rhot_app.engine.status import Advice
+from rhot_app.hand.skeleton import FINGERS
+from rhot_app.project import Rig, parse_rig
 from rhot_app.state import HandState
 from rhot_app.tracking.scene import make_tracker
 from rhot_app.tracking.tracker import CameraObservations

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from fake_tracker import FakeTracker
 from patience import eventually, settled
+from synthetic_node import SyntheticNode, synthetic_rig
 
 from rhot_app.engine import status
 from rhot_app.engine.core import Engine
@@ -23,7 +24,6 @@ from rhot_app.errors import EngineError, RecordingError, RhotError, RigError
 from rhot_app.project import OneEuroSettings, OutputSettings, Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, RecordKind
 from rhot_app.rig_history import versions
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
 from rhot_app.sources.replay import LogReplay, LogValidator
 from rhot_app.state import HandState

@@ -14,6 +14,7 @@ import msgspec
 import pytest
 from fake_tracker import FakeTracker
 from patience import PATIENCE_S, eventually
+from synthetic_node import synthetic_rig
 from websockets.sync.client import connect
 
 from rhot_app.engine import output_process
@@ -22,7 +23,6 @@ from rhot_app.engine.core import Engine
 from rhot_app.engine.output_process import OutputProcess
 from rhot_app.errors import OutputError
 from rhot_app.project import OutputSettings, Rig, save_rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.links import UdpNodes
 
 

@@ -3,9 +3,9 @@
 from types import SimpleNamespace
 
 import msgspec
+from synthetic_node import synthetic_rig
 
 from rhot_app.engine.node_meter import RECENT_NS, NodeMeter
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
 
 TEXT = b"1,2;3,4;5,6;7,8;9,10;11,12\n"

@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from synthetic_node import synthetic_rig
 from zmq.utils import z85
 
 from rhot_app.__main__ import main
@@ -20,7 +21,6 @@ from rhot_app.errors import EngineError
 from rhot_app.keys import keys_path, load_master_keys
 from rhot_app.recording.bookmarks import Bookmark, bookmark_record
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_node.keys import new_key_pair
 from rhot_node.network.pairing import new_code, show_code
 

@@ -11,6 +11,7 @@ import msgspec
 import pytest
 from fake_tracker import FakeTracker
 from patience import eventually, settled
+from synthetic_node import synthetic_rig
 from test_server_and_client import Bench
 
 from rhot_app.engine.activity import ActivityNote, read_activity
@@ -22,7 +23,6 @@ from rhot_app.engine.serve import Server
 from rhot_app.engine.status import EngineStatus
 from rhot_app.project import OutputSettings, Rig, save_rig
 from rhot_app.recording.raw_log import CONTINUES, LogReader, RecordKind, next_part
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.replay import LogReplay
 
 SOON_S = 0.2

@@ -10,13 +10,13 @@ from pathlib import Path
 import msgspec
 import pytest
 from patience import PATIENCE_S, eventually
+from synthetic_node import synthetic_rig
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import ensure_engine, running_engine, started_processes, stop_engine
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, save_rig
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.state import HandState
 
 IMPORTED = """

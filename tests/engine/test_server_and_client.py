@@ -11,6 +11,7 @@ import pytest
 import zmq
 from fake_tracker import FakeTracker
 from patience import PATIENCE_MS, PATIENCE_S, eventually, settled
+from synthetic_node import SyntheticNode, synthetic_rig
 
 from rhot_app.engine import client as engine_client
 from rhot_app.engine import core, node_control
@@ -24,7 +25,6 @@ from rhot_app.errors import EngineError, RecordingError
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.bookmarks import Bookmark, read_bookmarks
 from rhot_app.recording.video import video_name
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, synthetic_rig
 from rhot_app.sources.links import UdpNodes
 from rhot_app.state import HandState
 from rhot_node.files import JSON_BYTES_MAX

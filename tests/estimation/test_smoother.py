@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
+import fault_injection as alter
 import numpy as np
 import pytest
 from linear_motion import ConstantVelocity, kalman_update, place
 
 from rhot_app.engine.offline.replay_summary import replay_states
 from rhot_app.estimation.filter import ChunkedSmoother, FilteredState, IteratedFilter, smooth
-from rhot_app.evaluation import fault_injection as alter
 from rhot_app.evaluation.compare import MOTIONS
 from rhot_app.evaluation.data_sets import Order, data_set
 from rhot_app.project import with_tracker

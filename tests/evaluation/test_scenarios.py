@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,13 +10,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from rhot_app.evaluation import scenarios
 from rhot_app.evaluation.accuracy import Figures, accuracy, deviations, worn_by
 from rhot_app.evaluation.data_sets import DataSet, Order, data_set
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.project import FilterSettings, OneEuroSettings, Rig, TrackerSettings
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+import scenarios
 
 CLASSIC, MODEL = TrackerSettings(kind="classic"), TrackerSettings(kind="estimator")
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from synthetic_track import LATE_S, WORN, make_track, make_truth
 
-from rhot_app.evaluation.scenarios import found_after, lag, rising, settled_after, spread
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+from scenarios import found_after, lag, rising, settled_after, spread
 
 TIMES = np.arange(0.5, 3.5, 0.025)
 

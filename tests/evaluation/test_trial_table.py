@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from rhot_app.evaluation.compare import legend, run_table
-
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "trackers.py"
+sys.path.insert(0, str(BENCHMARK.parent))
+
+from scenarios import legend, run_table  # noqa: E402
+
 BLIND = {"classic": {"tips_mm": 33.25, "within_3_sd_share": None},
          "estimator": {"tips_mm": 1234.5, "within_3_sd_share": 0.99}}
 

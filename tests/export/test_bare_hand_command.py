@@ -23,7 +23,7 @@ from rhot_app.export.bare_hand import lost_intervals
 from rhot_app.hand.skeleton import JOINTS, HandPose
 from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig
 from rhot_app.recording.raw_log import Record, RecordKind, encode_header, encode_record
-from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_frames, bare_hand_rig
+from rhot_app.simulator.bare_hand.sequence import BareHandFrame, BareHandOptions, bare_hand_rig, bare_hand_sequence
 from rhot_app.sources.frame_sets import frame_sets, frames_left_out, on_one_clock, open_video
 from rhot_app.tracking.contours.follower import HandFollower
 from rhot_node.capture.yuv import YuvWriter
@@ -81,8 +81,9 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     folder = tmp_path_factory.mktemp("recorded")
     rig = bare_hand_rig(width=320)
     options = BareHandOptions(forearm=False)
-    there = list(bare_hand_frames(rig, "rest", 6 / FPS, FPS, 1, options))
-    away = list(bare_hand_frames(rig, "rest", EMPTY / FPS, FPS, 1, BareHandOptions(forearm=False, enters_after_s=9.0)))
+    there = list(bare_hand_sequence(rig, "rest", 6 / FPS, FPS, 1, options).frames())
+    away = list(bare_hand_sequence(rig, "rest", EMPTY / FPS, FPS, 1,
+                                   BareHandOptions(forearm=False, enters_after_s=9.0)).frames())
     frames = away + there
     poses = (start_pose_file(there[0].truth.pose),)
     save_rig(folder / "rig.json", msgspec.structs.replace(rig, tracker=TrackerSettings(start_poses=poses)))

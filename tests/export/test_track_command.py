@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 import pytest
 from drawn_films import RATE, StandIn, seen_by, use_networks, video
+from landmark_detector import landmark_rig, moving_hand
 from recorded_landmarks import FOLDER, FPS, JUDGED, WHOLE, needs_recording, recording
 from test_film_offset import film_of, heard, speech
 
@@ -25,7 +26,6 @@ from rhot_app.project import TrackerSettings, landmark_markers, load_rig, save_r
 from rhot_app.recording.landmark_log import write_landmark_log
 from rhot_app.recording.raw_log import LogReader, wall_clock_offset_ns
 from rhot_app.rig_history import versions
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.sources.frame_sets import recorded_films
 from rhot_app.state import Condition
 from rhot_node.capture.yuv import YuvWriter

@@ -8,10 +8,10 @@ import msgspec
 import pytest
 from processes import forked_programs, fresh_programs  # noqa: F401
 from streams import Stream
+from synthetic_node import synthetic_rig
 
 from rhot_app.hand.anatomy import load_hand
 from rhot_app.project import OutputSettings, Rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_node.files import resource_path
 
 

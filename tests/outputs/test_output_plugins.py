@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 from patience import eventually
 from streams import Stream
+from synthetic_node import SyntheticNode
 
 from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import make_sink
 from rhot_app.outputs.spec import parse_output
 from rhot_app.project import Rig, save_rig
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text()
 

@@ -6,12 +6,12 @@ import zlib
 from pathlib import Path
 
 import pytest
+from synthetic_node import synthetic_rig
 
 from rhot_app.errors import RecordingError
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark, bookmark_record, read_bookmarks
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind, encode_header, encode_record
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 
 DATAGRAM = Record(RecordKind.DATAGRAM, 1, 5, b"datagram")
 

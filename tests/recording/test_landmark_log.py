@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from landmark_detector import detected_landmarks, landmark_rig, moving_hand
 from recorded_landmarks import FOLDER, needs_recording, recording
 
 from rhot_app.__main__ import main
@@ -19,7 +20,6 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import CameraPose, load_rig, save_rig
 from rhot_app.recording.landmark_log import read_landmark_table, write_landmark_log
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.simulator.nodes.landmark_detector import detected_landmarks, landmark_rig, moving_hand
 from rhot_app.sources.replay import LogValidator
 from rhot_app.state import INFERRED_M, Condition
 from rhot_app.tracking.tracker import CameraObservations

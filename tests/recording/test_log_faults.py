@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from patience import eventually, quickest
+from synthetic_node import synthetic_rig
 
 from rhot_app.__main__ import main
 from rhot_app.errors import RecordingError
@@ -21,7 +22,6 @@ from rhot_app.recording import bookmarks, raw_log, recorder
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
 from rhot_app.recording.raw_log import LogReader, Losses, Record, RecordKind, encode_header, encode_log, encode_record
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 
 RIG = synthetic_rig()
 RECORDS = [Record(RecordKind.DATAGRAM, 1, k, bytes([k]) * 900) for k in range(40)]

@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 import pytest
 from patience import eventually
+from synthetic_node import synthetic_rig
 
 from rhot_app.__main__ import main
 from rhot_app.errors import RecordingError, RhotError
@@ -29,7 +30,6 @@ from rhot_app.recording.raw_log import (
     wall_clock_offset_ns,
 )
 from rhot_app.recording.recorder import Recorder
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 
 RECORDS = [Record(RecordKind.START, 0, 1, b"start"), Record(RecordKind.DATAGRAM, 1, -5, b""),
            Record(RecordKind.CLOCK_REQUEST, 2, 10**18, b"x" * 60000), Record(RecordKind.GAP, 0, 7, b"\1\0\0\0")]

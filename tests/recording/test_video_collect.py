@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from node_process import PERIOD_NS, READY_S, SIZE, Node, write_settings
 from patience import PATIENCE_S, eventually
+from synthetic_node import synthetic_rig
 
 from rhot_app.__main__ import main
 from rhot_app.errors import RecordingError
@@ -26,7 +27,6 @@ from rhot_app.project import Rig, save_rig
 from rhot_app.recording import video as video_module
 from rhot_app.recording.raw_log import LogReader, RecordKind, encode_header
 from rhot_app.recording.video import collect_videos, video_path
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_node.capture.yuv import YuvWriter
 from rhot_node.video.avi import read_stamps
 from rhot_node.wire.codec import decode

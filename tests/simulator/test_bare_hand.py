@@ -20,7 +20,6 @@ from rhot_app.hand.skeleton import FINGERS
 from rhot_app.simulator.bare_hand.sequence import (
     BareHandOptions,
     BareHandSequence,
-    bare_hand_frames,
     bare_hand_rig,
     bare_hand_sequence,
     varied_hand,
@@ -94,7 +93,8 @@ def test_the_surface_is_closed_encloses_the_joints_and_its_weights_sum_to_one() 
 
 
 def test_the_same_seed_gives_the_same_pictures_and_another_one_others() -> None:
-    frames = [list(bare_hand_frames(bare_hand_rig(width=WIDTH), "wave", 0.1, 30.0, seed, NEAR)) for seed in (3, 3, 4)]
+    rig = bare_hand_rig(width=WIDTH)
+    frames = [list(bare_hand_sequence(rig, "wave", 0.1, 30.0, seed, NEAR).frames()) for seed in (3, 3, 4)]
     for once, again, other in zip(*frames, strict=True):
         assert len(once.images) == 2 and once.t_ns == again.t_ns
         for image, same, different in zip(once.images, again.images, other.images, strict=True):

@@ -8,11 +8,11 @@ from pathlib import Path
 import msgspec
 from findable_nodes import free_udp_port, presence
 from patience import eventually
+from synthetic_node import synthetic_rig
 from trusted_node import TrustedNode
 
 from rhot_app.project import Broadcast, Rig
 from rhot_app.recording.raw_log import RecordKind
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.links import UdpNodes, new_session
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.clock import NodeClock

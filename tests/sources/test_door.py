@@ -7,9 +7,9 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from synthetic_node import synthetic_rig
 
 from rhot_app.project import Rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.validation import DatagramValidator
 from rhot_node.clock import NodeClock

@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 from shipped_markers import LANDMARKS21
+from synthetic_node import synthetic_rig
 from test_door import NODE_CLOCK, NOW_NS, SESSION, known_clock
 
 from rhot_app.project import OTHER_HAND, Rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.validation import DatagramValidator
 from rhot_app.tracking.kinds.kind import FrameTimes
 from rhot_app.tracking.kinds.landmarks import LandmarkKind

@@ -11,8 +11,8 @@ import pytest
 from findable_nodes import findable, free_udp_port, presence
 from patience import eventually
 from streaming_node import Setup
+from synthetic_node import synthetic_rig
 
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources import lost_nodes
 from rhot_app.sources.discovery import Found, Sighting
 from rhot_app.sources.links import UdpNodes

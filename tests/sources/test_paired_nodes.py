@@ -11,10 +11,10 @@ import msgspec
 import pytest
 from patience import PATIENCE_S, eventually, quickest, settled
 from streaming_node import Setup
+from synthetic_node import synthetic_rig
 
 from rhot_app.errors import SourceError
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.links import UdpNodes, new_session
 from rhot_app.sources.replay import LogValidator
 from rhot_node.keys import new_key_pair

@@ -12,13 +12,13 @@ from typing import Any
 import msgspec
 import pytest
 import zmq
+from synthetic_node import synthetic_rig
 from trusted_node import ABOUT, TrustedNode
 
 from rhot_app.__main__ import main
 from rhot_app.errors import PairingError
 from rhot_app.keys import MasterKeys, keys_path, load_master_keys
 from rhot_app.project import load_rig, save_rig
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.pairing import NodeAddress, ask_who, pair
 from rhot_node.errors import TrustError
 from rhot_node.keys import new_key_pair

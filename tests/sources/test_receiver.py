@@ -6,10 +6,10 @@ import time
 import pytest
 from patience import quickest
 from streaming_node import Records
+from synthetic_node import synthetic_rig
 
 from rhot_app.errors import SourceError
 from rhot_app.recording.raw_log import RecordKind
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.clock import NodeClockModel
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.receiver import (

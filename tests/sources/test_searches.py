@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic_node import synthetic_rig
 from test_door import NODE_CLOCK, NOW_NS, SESSION, known_clock
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig
 from rhot_app.sources.node_link import NodeLink
 from rhot_app.sources.replay import LogValidator
 from rhot_app.sources.validation import DatagramValidator

@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 from patience import eventually, settled
+from synthetic_node import SyntheticNode, hand_markers, synthetic_rig
 
 from rhot_app.project import Rig
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode, hand_markers, synthetic_rig
 from rhot_app.sources.links import UdpNodes, new_session
 from rhot_app.sources.node_link import SILENT_NS
 from rhot_app.tracking.tracker import CameraObservations

@@ -6,6 +6,14 @@ from functools import cache
 import msgspec
 import numpy as np
 import pytest
+from landmark_detector import (
+    DISTANCE_M,
+    EPOCH_NS,
+    LandmarkErrors,
+    detected_landmarks,
+    landmark_rig,
+    moving_hand,
+)
 from modelled_hand import states_of
 from shipped_markers import LANDMARKS21, RHOT6
 
@@ -17,14 +25,6 @@ from rhot_app.hand.motion.palm_on_plane import PalmOnPlane
 from rhot_app.hand.places import LANDMARK_ROLES
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import PalmPlane
-from rhot_app.simulator.nodes.landmark_detector import (
-    DISTANCE_M,
-    EPOCH_NS,
-    LandmarkErrors,
-    detected_landmarks,
-    landmark_rig,
-    moving_hand,
-)
 from rhot_app.state import Condition
 from rhot_app.tracking.markers import acquisition
 from rhot_app.tracking.markers.marker_model import compile_markers

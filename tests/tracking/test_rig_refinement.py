@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 import pytest
 from knocked_rig import filmed, moved, rig_of, scene_of, volume_motion
+from landmark_detector import landmark_rig
 from synthetic_rig import WIDE, Viewing, hand_trajectory, make_rig, observe
 
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.project import CameraCalibration, DepthSettings, Rig
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig
 from rhot_app.sources.replay import LogValidator
 from rhot_app.tracking.refinement.pair_observations import CAPACITY, PairStore, linearise
 from rhot_app.tracking.refinement.refined_rig import Refinement, Scale, refined_rig, stale_sentence, usable, verdict_of

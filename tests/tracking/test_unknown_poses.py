@@ -3,10 +3,10 @@
 import msgspec
 import numpy as np
 import pytest
+from landmark_detector import detected_landmarks, landmark_rig, moving_hand
 from modelled_hand import states_of
 
 from rhot_app.project import DepthSettings, Rig, TrackerSettings
-from rhot_app.simulator.nodes.landmark_detector import detected_landmarks, landmark_rig, moving_hand
 from rhot_app.tracking.scene import make_tracker
 
 RIG = landmark_rig()

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from fake_backend import FakeBackend
 from fake_engine import FakeEngine
+from landmark_detector import landmark_rig
 from PySide6.QtCore import QPoint
 from two_hands_engine import ASIDE, TwoHandsEngine, one_hand_rig, two_hand_rig
 
 from rhot_app.engine import status
 from rhot_app.project import TrackerSettings
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig
 from rhot_app.state import Condition, no_hand
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.models.words import hand_names

@@ -19,12 +19,12 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QImage
 from PySide6.QtTest import QTest
 from screen_pictures import check
+from synthetic_node import SyntheticNode
+from synthetic_node import synthetic_rig as streaming_rig
 
 from rhot_app.engine.client import EngineClient
 from rhot_app.outputs.spec import OutputStatus
 from rhot_app.project import OutputSettings, load_rig, save_rig
-from rhot_app.simulator.nodes.synthetic_node import SyntheticNode
-from rhot_app.simulator.nodes.synthetic_node import synthetic_rig as streaming_rig
 from rhot_app.ui.backend.contract import Opened
 from rhot_app.ui.common.guide import page_of
 from rhot_app.ui.dialogs.output_card import qr_code

@@ -24,7 +24,6 @@ from scipy.spatial.transform import Rotation
 from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation, rotation_from_quaternion
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import FINGERS, HandPose
@@ -228,16 +227,9 @@ def drawn_hand(model: HandModel, source: PoseSource, options: BareHandOptions, s
     return BareHand(surface, colours, arm, lamp, float(rng.uniform(0.30, 0.55)), markers)
 
 
-def bare_hand_frames(rig: Rig, motion: str, seconds: float, rate_hz: float, seed: int,
-                     options: BareHandOptions = BareHandOptions()) -> Iterator[BareHandFrame]:
-    """The frames of `bare_hand_sequence`, for studies that need no more."""
-    return bare_hand_sequence(rig, motion, seconds, rate_hz, seed, options).frames()
-
-
-def bare_hand_rig(side: Literal["right", "left"] = "right", *, scale: float = 1.0, cameras: int = 2,
-                  width: int | None = None) -> Rig:
-    """The twin's exactly calibrated rig, with the mean hand of one side, `scale` times as large. `width`: of smaller
-    pictures with the same field of view, px."""
+def bare_hand_rig(side: Literal["right", "left"] = "right", *, width: int | None = None) -> Rig:
+    """The twin's exactly calibrated rig, with the mean hand of one side. `width`: of smaller pictures with the same
+    field of view, px."""
     scene = make_scene(msgspec.structs.replace(twin_defaults(), hand=side), 0)
     lens = scene.intrinsics
     if width is not None:
@@ -246,8 +238,8 @@ def bare_hand_rig(side: Literal["right", "left"] = "right", *, scale: float = 1.
                                        fy=part * lens.fy, cx=part * (lens.cx + 0.5) - 0.5,
                                        cy=part * (lens.cy + 0.5) - 0.5)
     nodes = tuple(RigNode(node_id=k + 1, name=scene.names[k], intrinsics=lens, pose=scene.poses[k])
-                  for k in range(cameras))
-    return Rig(name="simulated", nodes=nodes, markers=scene.markers, hand=scaled_hand(scene.hand, scale),
+                  for k in range(len(scene.names)))
+    return Rig(name="simulated", nodes=nodes, markers=scene.markers, hand=scene.hand,
                calibration=CameraCalibration("exact", error_m=0.0))
 
 
@@ -342,6 +334,5 @@ def _pose_source(rig: Rig, motion: str, seed: int, options: BareHandOptions) -> 
 def _sources() -> str:
     """A digest of the programs that a rendered bare hand depends on."""
     own = Path(__file__).parent
-    files = [own / f"{name}.py" for name in ("surface", "skin", "painter", "rasterise", "sequence")]
-    files += [own.parent / "scene" / f"{name}.py" for name in ("motion", "background")]
+    files = [*sorted(own.glob("*.py")), *(own.parent / "scene" / f"{name}.py" for name in ("motion", "background"))]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()

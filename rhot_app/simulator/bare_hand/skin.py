@@ -51,12 +51,6 @@ def skin_colours(surface: Surface, tone: float, sleeve_rgb: tuple[float, float, 
     return np.clip(levels, 6.0, 250.0)
 
 
-def _right(surface: Surface):
-    import msgspec
-
-    return msgspec.structs.replace(surface.model.anatomy, side="right")
-
-
 def _tone(tone: float) -> Array:
     """(3,) levels of a tone between the scale's."""
     levels = np.array(TONES, dtype=np.float64)

@@ -21,6 +21,7 @@ from scipy.interpolate import CubicSpline
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import project_normalised
 from rhot_app.hand.skeleton import WRIST_ROLE
+from rhot_app.simulator.film.node_log import lost
 from rhot_app.simulator.film.points import at_own_rows
 from rhot_app.simulator.film.shot import Shot, camera_seed
 from rhot_app.simulator.film.truth import FrameTruth
@@ -103,7 +104,7 @@ class _Eye:
         part, place, noise = self.seen[number, marker, 0], self._places[number, marker], self._noise
         white = self._rng.normal(0.0, noise.white, 2)
         if not (part >= _ENOUGH and np.isfinite(place).all()):
-            return MarkerObservation(marker, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+            return lost(marker)
         diameter = float(self._diameters[number, marker])
         doubt = 0.0 if part >= _WHOLE else (1.0 - part) * diameter
         variance = noise.stated**2 + doubt**2

@@ -6,6 +6,7 @@ the truth about them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from rhot_node.wire.codec import encode
 from rhot_node.wire.messages import (
     ClockReply,
     ClockRequest,
+    MarkerFlag,
     MarkerObservation,
     NodeState,
     Observations,
@@ -49,6 +51,12 @@ class Network:
 
 
 CABLE: Final = Network()
+
+
+def lost(index: int) -> MarkerObservation:
+    """A marker that a node does not find."""
+    return MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+
 
 class NodeSender:
     """What one node says: its part of the log, deterministic by `rng`."""

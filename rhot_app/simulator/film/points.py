@@ -9,7 +9,6 @@ that it goes through the same door.
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,14 +23,14 @@ from rhot_app.project import Rig, load_rig, save_rig
 from rhot_app.recording.raw_log import Record
 from rhot_app.simulator.bare_hand.painter import BareHand
 from rhot_app.simulator.film.film import TRUTH_NAME, Progress, new_folder
-from rhot_app.simulator.film.node_log import CABLE, NodeSender, write_node_log
+from rhot_app.simulator.film.node_log import CABLE, NodeSender, lost, write_node_log
 from rhot_app.simulator.film.shot import RIG_NAME, Shot, make_shot, save_shot
 from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
 from rhot_app.simulator.render.sheet import Sheet
 from rhot_app.simulator.scene.scene import Scene, build_rig
 from rhot_app.simulator.scene.scene_description import FARTHEST_M, NEAREST_M, MarkerShow
 from rhot_app.sources.local_nodes import NodePorts
-from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
+from rhot_node.wire.messages import NO_FLAGS, MarkerObservation
 
 # -- rolling shutter ---------------------------------------------------------------------------------------------------
 
@@ -81,35 +80,29 @@ def write_points(shot: Shot, folder: Path, noise: PointNoise, progress: Progress
 
     Raises SimulatorError, also when what is shown wears no markers.
     """
-    if isinstance(shot.scene_object.thing, Sheet | BareHand):
-        raise SimulatorError(f"{shot.scene_object.name}: there are no markers on it. Show a hand that wears some, "
-                             "or a marker.")
     with new_folder(folder) as work:
         save_shot(shot, work)
         rig = load_rig(work / RIG_NAME)
-        streams = [_Stream(shot, rig, index, noise) for index in range(len(rig.nodes))]
-        records = [record for done, stream in enumerate(streams)
-                   for record in _noted(stream, done, len(streams), progress)]
+        streams = [PointStream(shot, rig, index, noise) for index in range(len(rig.nodes))]
+        records: list[Record] = []
+        for done, stream in enumerate(streams):
+            records += stream.records()
+            if progress is not None:
+                progress(done + 1, len(streams))
         write_node_log(work / LOG_NAME, rig, {"simulated": shot.scene_object.name}, records)
         truths = tuple(stream.truth() for stream in streams)
         save_truth(work / TRUTH_NAME, true_object(shot.scene_object, shot.seconds, truths))
 
 
-def _noted(stream: _Stream, done: int, count: int, progress: Progress | None) -> Iterator[Record]:
-    yield from stream.records()
-    if progress is not None:
-        progress(done + 1, count)
-
-
-class _Stream:
-    """One node's part of the log."""
+class PointStream:
+    """One node's part of the log. Raises SimulatorError when what is shown wears no markers."""
 
     def __init__(self, shot: Shot, rig: Rig, index: int, noise: PointNoise) -> None:
         self._scene, self._rig = shot.scene, rig
         self._camera = shot.scene.camera(index)
         self._noise = noise
         self._rng = np.random.default_rng([shot.scene.seed, index, 0x901])
-        self._voice = NodeSender(shot.scene, rig, index, self._rng, CABLE)
+        self._sender = NodeSender(shot.scene, rig, index, self._rng, CABLE)
         self._times_ns = np.array(shot.scene.frame_times_ns(index, shot.seconds))
         self._centres, self._pixels = self._observe(shot)
 
@@ -117,18 +110,22 @@ class _Stream:
         """The frames; every marker is whole, or it is not in the picture at all."""
         return FrameTruth(1e-9 * self._times_ns, np.isfinite(self._pixels[:, :, 0]).astype(np.float64))
 
-    def records(self) -> Iterator[Record]:
-        """Clock exchanges and datagrams."""
-        yield from self._voice.exchanges(1e-9 * float(self._times_ns[-1]))
+    def records(self, lit: Callable[[float], bool] = lambda t_s: True) -> Iterator[Record]:
+        """Clock exchanges and datagrams. `lit`: whether what is shown can be seen at a scene time, s."""
+        yield from self._sender.exchanges(1e-9 * float(self._times_ns[-1]))
         for number, t_ns in enumerate(self._times_ns):
-            record = self._voice.datagram(number, int(t_ns), [self._marker(number, index)
-                                                              for index in range(len(self._rig.markers.markers))])
+            markers = [self._marker(number, index) for index in range(len(self._rig.markers.markers))]
+            record = self._sender.datagram(number, int(t_ns), [
+                marker if lit(1e-9 * (t_ns + self._scene.row_time_ns * marker.y)) else lost(marker.index)
+                for marker in markers])
             if record is not None:
                 yield record
 
     def _observe(self, shot: Shot) -> tuple[Array, Array]:
         """(F, M, 3) m and (F, M, 2) px at the time of each marker's own row; NaN where it is not in the picture."""
-        assert not isinstance(shot.scene_object.thing, Sheet | BareHand)
+        if isinstance(shot.scene_object.thing, Sheet | BareHand):
+            raise SimulatorError(f"{shot.scene_object.name}: there are no markers on it. Show a hand that wears some, "
+                                 "or a marker.")
         grid = np.arange(0.0, shot.seconds + 0.1, 1.0 / _GRID_HZ)
         ways = shot.scene_object.thing.marker_positions(*shot.scene_object.source.sample(grid))
         times, row_time_s = 1e-9 * self._times_ns, 1e-9 * self._scene.row_time_ns
@@ -145,7 +142,7 @@ class _Stream:
         pixel, variance = self._pixels[number, index], self._noise.sigma_px**2
         x, y = pixel + self._rng.normal(0.0, self._noise.sigma_px, 2)
         if self._rng.random() < self._noise.loss or not np.isfinite(pixel).all():
-            return MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
+            return lost(index)
         marker = self._rig.markers.markers[index]
         radius = 1e-3 * marker.radius_mm if marker.radius_mm else _RADIUS_M
         depth = (self._camera.camera_from_world @ np.append(self._centres[number, index], 1.0))[2]

@@ -163,11 +163,6 @@ class MarkerPath:
     reach: tuple[float, float]
     seed: int
 
-    @property
-    def top_speed(self) -> float:
-        """m/s, at most."""
-        return float(2.0 * np.pi * np.hypot(_SWING_HZ[0] * self.reach[0], _SWING_HZ[1] * self.reach[1]))
-
     def sample(self, times_s: Array) -> tuple[Array, Array]:
         """world_from_prop (T, 4, 4) at scene times (T,) s; and no angles, (T, 0)."""
         times_s = np.asarray(times_s, dtype=np.float64)

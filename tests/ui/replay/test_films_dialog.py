@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from drawn_films import RATE, StandIn, seen_by, use_networks, video
 from fake_backend import InProcessSolver
+from landmark_detector import landmark_rig, moving_hand
 from person import Person
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
@@ -19,7 +20,6 @@ from test_replay_window import Desk
 from rhot_app.export.film_log import ChosenFilm, log_films
 from rhot_app.project import save_rig
 from rhot_app.recording.raw_log import LogReader
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.sources.frame_sets import recorded_films
 from rhot_app.ui.replay.films_dialog import FilmsDialog
 from rhot_node.landmarks import networks

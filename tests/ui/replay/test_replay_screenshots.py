@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 from fake_backend import InProcessSolver
+from fault_injection import silent
 from person import Person
 from PySide6.QtCore import Qt
 from screen_pictures import SIZE, UPDATE
 
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
-from rhot_app.evaluation.fault_injection import silent
 from rhot_app.recording.bookmarks import Bookmark, append_bookmark
 from rhot_app.recording.raw_log import LogReader, encode_header, encode_record
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bones_twin import SIX, Sloppiness, person, record
 from fake_engine import FakeEngine
+from landmark_detector import landmark_rig, moving_hand
 from log_writing import write_log
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -21,7 +22,6 @@ from rhot_app.calibration.kinds.bones import propose
 from rhot_app.calibration.registry import InForce
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import load_rig
-from rhot_app.simulator.nodes.landmark_detector import landmark_rig, moving_hand
 from rhot_app.ui.wizards.bones import SweepGuide, make_guide
 from rhot_app.ui.wizards.framework.movement import QuietGuide
 from rhot_app.ui.wizards.framework.step import Bar

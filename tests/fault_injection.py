@@ -5,7 +5,6 @@ Each is a change of records, so that one take serves for many trials. Only what 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -13,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.recording.raw_log import Record, RecordKind
-from rhot_app.simulator.film.node_log import T0_MASTER_NS
+from rhot_app.simulator.film.node_log import T0_MASTER_NS, lost
 from rhot_node.wire.codec import decode, encode
-from rhot_node.wire.messages import ClockReply, ClockRequest, MarkerFlag, MarkerObservation, Observations
+from rhot_node.wire.messages import ClockReply, ClockRequest, MarkerObservation, Observations
 
 Array = NDArray[np.float64]
 Change = Callable[[float, int, Sequence[MarkerObservation]], Sequence[MarkerObservation]]
@@ -23,11 +22,6 @@ Change = Callable[[float, int, Sequence[MarkerObservation]], Sequence[MarkerObse
 
 EPISODE_S = (0.1, 0.8)
 """How long a marker stays hidden at a time, unless told otherwise: evenly between these."""
-
-
-def lost(index: int) -> MarkerObservation:
-    """A marker that a node does not find."""
-    return MarkerObservation(index, math.nan, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, MarkerFlag.LOST)
 
 
 def changed(records: Sequence[Record], change: Change) -> list[Record]:
