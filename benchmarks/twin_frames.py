@@ -102,13 +102,13 @@ def places(body: HandBody, camera: CameraModel, source: PoseSource, t_row0_s: fl
     transforms, angles = source.sample(np.array([t_row0_s]))
     rows = camera.project(body.marker_positions(transforms, angles)[0])[:, 1]
     points = np.full((body.marker_count, 2), np.nan)
-    for n in range(int((body.marker >= 0).sum())):  # painted solids come first
-        marker = body.marker[n]
+    for n in range(int((body.solids.marker >= 0).sum())):  # painted solids come first
+        marker = body.solids.marker[n]
         for _ in range(2):
             transforms, angles = source.sample(np.array([t_row0_s + row_time_s * rows[marker]]))
             solid = body.place(camera.camera_from_world @ transforms, angles)[0, n]
-            points[marker] = _band_middle(camera, solid, body.size[n]) if body.kind[n] == CYLINDER else \
-                _outline_centroid(body.kind[n], solid, body.size, n, camera.intrinsics)
+            points[marker] = _band_middle(camera, solid, body.solids.size[n]) if body.solids.kind[n] == CYLINDER else \
+                _outline_centroid(body.solids.kind[n], solid, body.solids.size, n, camera.intrinsics)
             rows[marker] = points[marker, 1]
     return points
 
@@ -128,8 +128,9 @@ def outlines(body: HandBody, camera: CameraModel, source: PoseSource) -> Array:
     transforms, angles = source.sample(np.zeros(1))
     parameters = body.place(camera.camera_from_world @ transforms, angles)[0]
     points = np.full((body.marker_count, 2), np.nan)
-    for n in range(int((body.marker >= 0).sum())):
-        points[body.marker[n]] = _outline_centroid(body.kind[n], parameters[n], body.size, n, camera.intrinsics)
+    for n in range(int((body.solids.marker >= 0).sum())):
+        points[body.solids.marker[n]] = _outline_centroid(body.solids.kind[n], parameters[n], body.solids.size, n,
+                                                          camera.intrinsics)
     return points
 
 

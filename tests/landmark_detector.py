@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.anatomy import load_hand
-from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.kinematics import frames_and_points
 from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.places import LANDMARK_ROLES
@@ -60,7 +60,7 @@ class Hand:
 
     def joints(self) -> Array:
         """(T, 21, 3) m, world."""
-        return _points(self.model, self)[1][:, :len(LANDMARK_ROLES)]
+        return frames_and_points(self.model.dh, self.worlds, self.angles)[1][:, :len(LANDMARK_ROLES)]
 
 
 def landmark_rig(cameras: int = 2, markers: MarkerSet | None = None, *, float_scale: bool = False) -> Rig:
@@ -101,11 +101,10 @@ def detected_landmarks(rig: Rig, hand: Hand, seed: int,
     joints = [LANDMARK_ROLES.index(role) if role in LANDMARK_ROLES
               else len(LANDMARK_ROLES) + [f"{name}_tip" for name in hand.model.anatomy.fingers].index(role)
               for role in roles]
-    frames, points = _points(hand.model, hand)
+    frames, points = frames_and_points(hand.model.dh, hand.worlds, hand.angles)
     rows, count = hand.model.dh.point_row[joints], len(joints)
     offsets = np.where(landmark[:, None], errors.anatomy * rng.standard_normal((count, 3)), 0.0)
-    rotations = np.where((rows >= 0)[None, :, None, None], frames[:, rows, :, :3], hand.worlds[:, None, :3, :3])
-    places = points[:, joints] + np.einsum("tmij,mj->tmi", rotations, offsets)
+    places = points[:, joints] + np.einsum("tmij,mj->tmi", frames[:, rows, :, :3], offsets)
     out = []
     for camera, node in enumerate(rig.nodes):
         model = CameraModel.from_rig(node.intrinsics, node.pose)
@@ -126,14 +125,4 @@ def detected_landmarks(rig: Rig, hand: Hand, seed: int,
                 camera, t_ns, 0, 1e-5, t_ns + 10**6, 1e-3, 1e-3, pixels, (sd**2)[:, None, None] * np.eye(2),
                 np.ones(count), np.ones(count), np.zeros(count, np.uint16)))
     return sorted(out, key=lambda one: (one.t_row0_master_ns, one.camera))
-
-
-def _points(model: HandModel, hand: Hand) -> tuple[Array, Array]:
-    """Frames (T, R, 3, 4) of the table's rows and its points (T, 26, 3) m."""
-    frames, points = [], []
-    for world, angles in zip(hand.worlds, hand.angles, strict=True):
-        frames.append(empty_frames(model.dh))
-        points.append(np.empty((len(model.dh.point_row), 3)))
-        forward_arrays(model.dh, world, angles, frames[-1], points[-1])
-    return np.array(frames), np.array(points)
 

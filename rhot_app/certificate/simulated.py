@@ -35,7 +35,7 @@ from rhot_app.simulator.film.scene_objects import SceneObject
 from rhot_app.simulator.film.shot import Shot, make_shot
 from rhot_app.simulator.render.body import PALM_GROUP, POINT_M, SKIN
 from rhot_app.simulator.render.painter import PoseSource
-from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, RigidTarget
+from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, RigidTarget, capsules
 from rhot_app.simulator.scene.scene import Scene, build_rig
 from rhot_app.simulator.scene.scene_description import MarkerShow
 from rhot_app.sources.local_nodes import NodePorts
@@ -137,11 +137,9 @@ def _rod_shot(scene: Scene, seconds: float, *, still: bool) -> Shot:
     centres[0], centres[1] = -half, half
     inner = half * (1.0 - (BALL_RADIUS_M + 0.003) / half[0])
     point = np.array([0.0, POINT_M, 0.0])
+    first, second = (marker.display_rgb for marker in scene.markers.markers[:2])
     rod = RigidTarget(
-        group=np.array([0, 1, PALM_GROUP], dtype=np.int64), marker=np.array([0, 1, SKIN], dtype=np.int64),
-        size=np.array([[BALL_RADIUS_M, 0.0, 0.0], [BALL_RADIUS_M, 0.0, 0.0], [0.003, 0.0, 0.0]]),
-        rgb=np.array([scene.markers.markers[0].display_rgb, scene.markers.markers[1].display_rgb, STICK_RGB],
-                     dtype=np.float64),
+        capsules((0, 1, PALM_GROUP), (0, 1, SKIN), (BALL_RADIUS_M, BALL_RADIUS_M, 0.003), (first, second, STICK_RGB)),
         ends=np.array([[-half, -half + point], [half, half + point], [-inner, inner]]), centres=centres)
     return Shot(scene, MarkerShow(), SceneObject("rod", rod, motion), seconds)
 

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.estimation.se3 import move_pose
-from rhot_app.hand.dh import DhArrays
+from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, JOINTS, HandPose
 
@@ -46,6 +46,18 @@ def jacobian(model: HandModel, pose: HandPose) -> Array:
     out = np.empty((len(points), 3, TWIST + len(ANGLES)))
     jacobian_arrays(model.dh, pose.world_from_palm, frames, points, out)
     return out
+
+
+def frames_and_points(dh: DhArrays, worlds: Array, angles: Array) -> tuple[Array, Array]:
+    """Frames (T, R + 1, 3, 4) of the table's rows, the palm's last so that ROOT finds it, and points (T, 26, 3) m, of
+    poses world_from_palm (T, 4, 4) and angles (T, 21) rad."""
+    worlds, angles = np.ascontiguousarray(worlds), np.ascontiguousarray(angles)
+    frames = np.empty((len(worlds), len(dh.parent) + 1, 3, 4))
+    points = np.empty((len(worlds), len(dh.point_row), 3))
+    for k in range(len(worlds)):
+        forward_arrays(dh, worlds[k], angles[k], frames[k, :-1], points[k])
+    frames[:, ROOT] = worlds[:, :3]
+    return frames, points
 
 
 def empty_frames(dh: DhArrays) -> Array:

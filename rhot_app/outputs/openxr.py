@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.se3 import fill_quaternion
 from rhot_app.hand.dh import ROOT
-from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.kinematics import frames_and_points
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.shape import FLESH
 from rhot_app.hand.skeleton import ANGLES, FINGERS, THUMB_JOINTS, HandPose
@@ -65,8 +65,7 @@ class OpenXrHand:
 
 def openxr_map(model: HandModel) -> OpenXrMap:
     """Where the 26 joints are on this hand."""
-    frames, points = empty_frames(model.dh), np.empty((len(model.dh.point_row), 3))
-    forward_arrays(model.dh, np.eye(4), np.zeros(len(ANGLES)), frames, points)
+    frames = frames_and_points(model.dh, np.eye(4)[None], np.zeros((1, len(ANGLES))))[0][0]
     mirror = np.array([1.0, model.mirror, 1.0])
     places = _palm_places(model, mirror)
     for finger in range(5):
@@ -84,20 +83,18 @@ def openxr_map(model: HandModel) -> OpenXrMap:
 
 def openxr_hand(model: HandModel, mapping: OpenXrMap, pose: HandPose) -> OpenXrHand:
     """The 26 joints of a posed hand; `mapping` as `openxr_map` made it for the same model."""
-    frames, points = empty_frames(model.dh), np.empty((len(model.dh.point_row), 3))
-    forward_arrays(model.dh, pose.world_from_palm, pose.angles, frames, points)
+    frames = frames_and_points(model.dh, pose.world_from_palm[None], pose.angles[None])[0][0]
     hand = OpenXrHand(np.empty((len(OPENXR_JOINTS), 3)), np.empty((len(OPENXR_JOINTS), 4)), mapping.radius)
-    openxr_arrays(mapping, pose.world_from_palm, frames, hand.positions, hand.orientations)
+    openxr_arrays(mapping, frames, hand.positions, hand.orientations)
     return hand
 
 
 @njit(cache=True)
-def openxr_arrays(mapping: OpenXrMap, world_from_palm: Array, frames: Array, positions: Array,
-                  orientations: Array) -> None:
-    """Fill `positions` (26, 3) and `orientations` (26, 4) from the frames that `forward_arrays` filled."""
+def openxr_arrays(mapping: OpenXrMap, frames: Array, positions: Array, orientations: Array) -> None:
+    """Fill `positions` (26, 3) and `orientations` (26, 4) from the `frames` (R + 1, 3, 4) of `frames_and_points`."""
     turned = np.empty((3, 3))
     for joint in range(mapping.row.shape[0]):
-        base = world_from_palm if mapping.row[joint] < 0 else frames[mapping.row[joint]]
+        base = frames[mapping.row[joint]]
         turn, offset = mapping.turn[joint], mapping.offset[joint]
         for i in range(3):
             positions[joint, i] = (base[i, 3] + base[i, 0] * offset[0] + base[i, 1] * offset[1]

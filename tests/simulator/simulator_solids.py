@@ -11,11 +11,11 @@ from rhot_app.hand.model import neutral_pose
 from rhot_app.simulator.render.body import PALM_GROUP, SKIN
 from rhot_app.simulator.render.camera_controls import Controls, Lamp
 from rhot_app.simulator.render.exposure_samples import Shutter
-from rhot_app.simulator.render.painter import Solids
+from rhot_app.simulator.render.painter import Body
 from rhot_app.simulator.render.render import Exposure, FrameRenderer, Optics
 from rhot_app.simulator.render.solids_painter import SolidsPainter
 from rhot_app.simulator.scene.motion import FACING
-from rhot_app.simulator.scene.rigid_target import RigidTarget
+from rhot_app.simulator.scene.rigid_target import RigidTarget, capsules
 
 Array = NDArray[np.float64]
 
@@ -54,17 +54,14 @@ class Shown:
 
 def balls(radii: list[float], places: list[tuple[float, float, float]], painted: list[bool]) -> RigidTarget:
     """Balls at fixed places about the prop's origin; painted ones (white) first, the others are black skin."""
-    count = len(radii)
     return RigidTarget(
-        group=np.arange(count) % PALM_GROUP,
-        marker=np.array([k if paint else SKIN for k, paint in enumerate(painted)]),
-        size=np.array([[radius, 0.0, 0.0] for radius in radii]),
-        rgb=np.array([[255.0] * 3 if paint else [0.0] * 3 for paint in painted]),
+        capsules([k % PALM_GROUP for k in range(len(radii))], [k if paint else SKIN for k, paint in enumerate(painted)],
+                 radii, [(255.0, 255.0, 255.0) if paint else (0.0, 0.0, 0.0) for paint in painted]),
         ends=np.array([[place, np.add(place, (0.0, 1e-7, 0.0))] for place in places]),
         centres=np.array([place for place, paint in zip(places, painted, strict=True) if paint]))
 
 
-def renderer(body: Solids, shutter: Shutter = STILL, seed: int = 1, background: NDArray[np.float32] | None = None,
+def renderer(body: Body, shutter: Shutter = STILL, seed: int = 1, background: NDArray[np.float32] | None = None,
              shading: float = 0.0, lamp: Lamp = STEADY) -> FrameRenderer:
     """A renderer of `body` before black, or another background (3, H, W)."""
     if background is None:

@@ -127,7 +127,7 @@ def test_fields_that_say_what_was_always_so_change_no_bit() -> None:
     told = worn({"patch": "segment", "gap_deg": 0.0})
     one, other = (Picture(RIGHT_MODEL, markers, back=False) for markers in (RHOT6, told))
     np.testing.assert_array_equal(one.image, other.image)
-    assert not build_body(RIGHT_MODEL, RHOT6).paint.any(), "no ray asks where the paint of a whole segment is"
+    assert not build_body(RIGHT_MODEL, RHOT6).solids.paint.any(), "no ray asks where the paint of a whole segment is"
 
 
 def scene(**settings: Any) -> Scene:

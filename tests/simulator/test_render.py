@@ -107,11 +107,11 @@ def test_solids_ride_on_their_bones_as_the_hands_shape_says() -> None:
     body = build_body(MODEL, RHOT6)
     placed = body.place(pose.world_from_palm[None], pose.angles[None])[0]
     shape = segments(MODEL, pose, forward(MODEL, pose))
-    skin = np.flatnonzero((body.marker == SKIN) & (body.kind == CAPSULE))
+    skin = np.flatnonzero((body.solids.marker == SKIN) & (body.solids.kind == CAPSULE))
     named = [k for k, name in enumerate(shape.names) if not name.startswith(("forearm", "wrist"))]
     np.testing.assert_allclose(placed[skin, :3], shape.start[named], atol=1e-12)
     np.testing.assert_allclose(placed[skin, 3:6], shape.end[named], atol=1e-12)
-    np.testing.assert_allclose(body.size[skin, 0], shape.radius[named])
+    np.testing.assert_allclose(body.solids.size[skin, 0], shape.radius[named])
 
 
 def test_a_finger_before_another_hides_its_marker() -> None:
@@ -129,7 +129,7 @@ def test_a_finger_before_another_hides_its_marker() -> None:
 
 def test_hidden_markers_are_bare_skin() -> None:
     body = build_body(MODEL, RHOT6, frozenset({"thumb"}))
-    assert 0 not in body.marker and body.marker_count == 6
+    assert 0 not in body.solids.marker and body.marker_count == 6
     camera = renderer(body, shading=SHADING)
     _, visible = camera.render(Shown(), 0.0, 0)
     assert visible[0] == 0.0 and visible[1:].min() > 0.9

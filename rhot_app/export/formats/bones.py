@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.dh import ROOT
+from rhot_app.hand.kinematics import frames_and_points
 from rhot_app.hand.model import HandModel
 from rhot_app.hand.skeleton import ANGLES, JOINTS
 
@@ -42,28 +43,22 @@ class Skeleton:
     def rotations(self, angles: Array) -> Array:
         """(N, 15, 3, 3): how the joints behind the wrist are turned, each in its parent's turned axes, at `angles`
         (N, 21) rad."""
-        turned = np.empty((len(angles), len(TURNING), 3, 3))
-        frames, points = empty_frames(self.model.dh), np.empty((len(self.model.dh.point_row), 3))
-        rows, palm = _rows(self.model), np.eye(4)
-        turned[:, 0] = np.eye(3)
-        for number, pose in enumerate(np.ascontiguousarray(angles, dtype=np.float64)):
-            forward_arrays(self.model.dh, palm, pose, frames, points)
-            turned[number, 1:] = frames[rows, :, :3]
-        turned[:, 1:] = turned[:, 1:] @ self.rest_rotations[1:].transpose(0, 2, 1)
+        palms = np.tile(np.eye(4), (len(angles), 1, 1))
+        frames, _ = frames_and_points(self.model.dh, palms, angles.astype(np.float64))
+        turned = frames[:, _rows(self.model), :, :3] @ self.rest_rotations.transpose(0, 2, 1)
         return np.asarray(turned[:, PARENTS[1:]].swapaxes(-1, -2) @ turned[:, 1:])
 
 
 def skeleton_of(model: HandModel) -> Skeleton:
     """The skeleton of a hand."""
-    frames, points = empty_frames(model.dh), np.empty((len(model.dh.point_row), 3))
-    forward_arrays(model.dh, np.eye(4), np.zeros(len(ANGLES)), frames, points)
-    rest = points[:len(JOINTS)].copy()
-    rotations = np.concatenate([np.eye(3)[None], frames[_rows(model), :, :3]])
+    (frames,), (points,) = frames_and_points(model.dh, np.eye(4)[None], np.zeros((1, len(ANGLES))))
+    rest = points[:len(JOINTS)]
     parents = [0 if parent < 0 else TURNING[parent] for parent in PARENTS]
     tips = rest[list(TIPS)] - rest[[tip - 1 for tip in TIPS]]
-    return Skeleton(model, rest, rest[list(TURNING)] - rest[parents], tips, rotations)
+    return Skeleton(model, rest, rest[list(TURNING)] - rest[parents], tips, frames[_rows(model), :, :3])
 
 
 def _rows(model: HandModel) -> NDArray[np.int64]:
-    """(15,) the row of the table that carries the bone behind each joint: the one that the next joint rides on."""
-    return model.dh.point_row[[joint + 1 for joint in TURNING[1:]]]
+    """(16,) the row of the table that carries the bone behind each turning joint: the one that the next joint rides
+    on; ROOT for the wrist."""
+    return np.array([ROOT, *model.dh.point_row[[joint + 1 for joint in TURNING[1:]]]])

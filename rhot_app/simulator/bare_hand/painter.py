@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.kinematics import frames_and_points
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.simulator.bare_hand.rasterise import SAMPLES, accumulate, unshadowed, vertex_normals
 from rhot_app.simulator.bare_hand.surface import BONES, FOREARM, Surface
@@ -47,13 +47,8 @@ class BareHand:
 
     def joints_and_markers(self, world_from_palm: Array, angles: Array) -> tuple[Array, Array]:
         """(T, 21, 3) m joints, and (T, M, 3) NaN: it wears no marker."""
-        dh = self.surface.model.dh
-        frames, points = empty_frames(dh), np.empty((len(dh.point_row), 3))
-        joints = np.empty((len(angles), len(JOINTS), 3))
-        for k in range(len(angles)):
-            forward_arrays(dh, np.ascontiguousarray(world_from_palm[k]), angles[k], frames, points)
-            joints[k] = points[:len(JOINTS)]
-        return joints, np.full((len(angles), self.marker_count, 3), np.nan)
+        points = frames_and_points(self.surface.model.dh, world_from_palm, angles)[1]
+        return points[:, :len(JOINTS)], self.marker_positions(world_from_palm, angles)
 
     def marker_positions(self, world_from_palm: Array, angles: Array) -> Array:
         """(T, M, 3) NaN."""
@@ -74,16 +69,13 @@ class BareHand:
 
     def _bones(self, world_from_palm: Array, angles: Array) -> Array:
         """(T, B, 3, 4): where each bone takes the surface from its rest pose."""
-        dh = self.surface.model.dh
-        frames, points = empty_frames(dh), np.empty((len(dh.point_row), 3))
+        frames = frames_and_points(self.surface.model.dh, world_from_palm, angles)[0]
         out = np.empty((len(angles), BONES, 3, 4))
         rest = self.surface.bone_from_palm
-        for k in range(len(angles)):
-            palm = np.ascontiguousarray(world_from_palm[k])
-            forward_arrays(dh, palm, angles[k], frames, points)
+        for k, palm in enumerate(world_from_palm):
             out[k] = palm[:3]
             for bone in np.flatnonzero(self.surface.rows >= 0):
-                frame = frames[self.surface.rows[bone]]
+                frame = frames[k, self.surface.rows[bone]]
                 out[k, bone, :, :3] = frame[:, :3] @ rest[bone, :, :3]
                 out[k, bone, :, 3] = frame[:, :3] @ rest[bone, :, 3] + frame[:, 3]
             along = _WRIST_PART * palm[:3, 0] + (1.0 - _WRIST_PART) * self.arm

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.hand.model import HandModel, build_model
-from rhot_app.simulator.bare_hand.surface import FOREARM, PALM, SLEEVE_GROUP, Surface, rest_frames
+from rhot_app.simulator.bare_hand.surface import FOREARM, PALM, SLEEVE_GROUP, Surface, rest_frames, smooth_step
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ def _details(model: HandModel, surface: Surface, bone: NDArray[np.int64]) -> tup
     frames, points = rest_frames(model)
     palmar, creases, nails, blush = np.zeros(count), np.ones(count), np.zeros(count), np.zeros(count)
     of_palm = (bone == PALM) | (bone == FOREARM)
-    palmar[of_palm] = _step((-0.004 - vertices[of_palm, 2]) / 0.010)
+    palmar[of_palm] = smooth_step((-0.004 - vertices[of_palm, 2]) / 0.010)
     for finger in range(5):
         joints = points[1 + 4 * finger:5 + 4 * finger]
         for k in range(3):
@@ -87,8 +87,8 @@ def _details(model: HandModel, surface: Surface, bone: NDArray[np.int64]) -> tup
             along, down, across = local @ along_axis, local @ bend, local @ hinge
             radius, length = float(model.radii[finger, k]), float(model.bones[finger, k])
             facing = down / np.maximum(np.hypot(down, across), 1e-6)
-            palmar[mine] = _step(0.5 + 0.5 * facing / 0.6)
-            below, above = _step(facing / 0.5), _step(-facing / 0.5)
+            palmar[mine] = smooth_step(0.5 + 0.5 * facing / 0.6)
+            below, above = smooth_step(facing / 0.5), smooth_step(-facing / 0.5)
             if k > 0:
                 creases[mine] *= 1.0 - 0.30 * below * _line(along) - 0.14 * above * (
                     _line(along) + _line(along - 3e-3) + _line(along + 3e-3))
@@ -99,11 +99,11 @@ def _details(model: HandModel, surface: Surface, bone: NDArray[np.int64]) -> tup
             if k == 0 and finger > 0:
                 creases[mine] *= 1.0 - 0.28 * below * _line(along - 0.46 * length)
             if k == 2:
-                blush[mine] += 0.10 * below * _step(along / length)
+                blush[mine] += 0.10 * below * smooth_step(along / length)
                 reach = (np.abs((along - 0.60 * length) / (0.30 * length)) ** 3.0
                          + np.abs(across / (0.74 * radius)) ** 3.0)
                 nails[mine] = above * np.where(reach < 1.0, 1.0, -np.exp(-((reach - 1.0) / 0.35) ** 2))
-                tip = above * (reach < 1.0) * _step((along - 0.80 * length) / (0.06 * length))
+                tip = above * (reach < 1.0) * smooth_step((along - 0.80 * length) / (0.06 * length))
                 blush[mine] -= 0.10 * tip
     lines = np.full(count, np.inf)
     for polyline in _palm_lines(points):
@@ -136,7 +136,3 @@ def _distance(points: Array, polyline: Array) -> Array:
 def _line(distance: Array) -> Array:
     return np.asarray(np.exp(-(distance / _CREASE_M) ** 2))
 
-
-def _step(x: Array) -> Array:
-    t = np.clip(x, 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))

@@ -18,7 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.hand.anatomy import HandAnatomy
-from rhot_app.hand.kinematics import empty_frames, forward_arrays
+from rhot_app.hand.kinematics import frames_and_points
 from rhot_app.hand.model import HandModel, build_model
 
 Array = NDArray[np.float64]
@@ -88,10 +88,9 @@ def build_surface(anatomy: HandAnatomy, *, spacing_m: float = 2.0e-3, sleeve_fro
 
 
 def rest_frames(model: HandModel) -> tuple[Array, Array]:
-    """(R, 3, 4) frames and (26, 3) m points of the hand at rest in its palm frame."""
-    frames, points = empty_frames(model.dh), np.empty((len(model.dh.point_row), 3))
-    forward_arrays(model.dh, np.eye(4), np.radians(REST_DEG), frames, points)
-    return frames, points
+    """(R + 1, 3, 4) frames and (26, 3) m points of the hand at rest in its palm frame."""
+    frames, points = frames_and_points(model.dh, np.eye(4)[None], np.radians(REST_DEG)[None])
+    return frames[0], points[0]
 
 
 # -- limbs ------------------------------------------------------------------------------------------------------------
@@ -339,11 +338,11 @@ def _quads(inside: NDArray[np.bool_], number: Indices) -> Indices:
 def _weights(model: HandModel, points: Array, vertices: Array, nearest: Array) -> Array:
     """(V, BONES): how far each vertex follows each bone, smooth across joints and between fingers."""
     weights = np.zeros((len(vertices), BONES))
-    back = _smooth_step((-0.004 - vertices[:, 0]) / 0.03)  # the wrist bends over three centimetres
+    back = smooth_step((-0.004 - vertices[:, 0]) / 0.03)  # the wrist bends over three centimetres
     fingers = np.exp(-np.clip(nearest[:, 1:5] - nearest[:, 1:5].min(axis=1, keepdims=True), 0.0, 0.05) / 2.0e-3)
     fingers /= fingers.sum(axis=1, keepdims=True)
     others = np.minimum(nearest[:, 1:5].min(axis=1), nearest[:, PALM_GROUP])
-    thumb = _smooth_step(0.5 + (others - nearest[:, 0]) / 0.016)
+    thumb = smooth_step(0.5 + (others - nearest[:, 0]) / 0.016)
     for finger in range(5):
         part = thumb if finger == 0 else (1.0 - thumb) * fingers[:, finger - 1]
         joints = points[1 + 4 * finger:5 + 4 * finger]
@@ -352,9 +351,9 @@ def _weights(model: HandModel, points: Array, vertices: Array, nearest: Array) -
         for k in range(3):
             after = _unit(joints[k + 1] - joints[k])
             width = (1.2 if k == 0 else 0.85) * float(model.radii[finger, k])
-            passed = _smooth_step(0.5 + 0.5 * ((vertices - joints[k]) @ _unit(before + after)) / width)
+            passed = smooth_step(0.5 + 0.5 * ((vertices - joints[k]) @ _unit(before + after)) / width)
             if finger == 0 and k == 0:
-                passed = _smooth_step(0.5 + 0.5 * ((vertices - joints[0]) @ after) / 0.014)
+                passed = smooth_step(0.5 + 0.5 * ((vertices - joints[0]) @ after) / 0.014)
             weights[:, PALM if k == 0 else 3 * finger + k] += left * (1.0 - passed)
             left, before = left * passed, after
         weights[:, 3 + 3 * finger] += left
@@ -363,6 +362,7 @@ def _weights(model: HandModel, points: Array, vertices: Array, nearest: Array) -
     return weights
 
 
-def _smooth_step(x: Array) -> Array:
+def smooth_step(x: Array) -> Array:
+    """0 below 0, 1 above 1, without a corner between."""
     t = np.clip(x, 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t))

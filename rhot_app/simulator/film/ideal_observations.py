@@ -25,7 +25,18 @@ from rhot_app.simulator.film.node_log import lost
 from rhot_app.simulator.film.points import at_own_rows
 from rhot_app.simulator.film.shot import Shot, camera_seed
 from rhot_app.simulator.film.truth import FrameTruth
-from rhot_app.simulator.render.body import ACROSS, BOUNDS, CAPSULE, HALF, ON_ONE_SIDE, PALM_GROUP, SIDE, HandBody
+from rhot_app.simulator.render.body import (
+    ACROSS,
+    BOUNDS,
+    CAPSULE,
+    GROUP,
+    HALF,
+    KIND,
+    ON_ONE_SIDE,
+    PALM_GROUP,
+    SIDE,
+    HandBody,
+)
 from rhot_app.simulator.render.raycast import PREPARED, hit, prepare
 from rhot_node.wire.messages import NO_FLAGS, MarkerFlag, MarkerObservation
 
@@ -78,10 +89,11 @@ class _Eye:
         self._rng = np.random.default_rng([scene.seed, index, 0x516])
         self._radii = np.array([1e-3 * marker.radius_mm if marker.radius_mm else _RADIUS_M
                                 for marker in scene.markers.markers])
-        self._patches = {int(body.marker[solid]): int(solid)
-                         for solid in np.flatnonzero((body.marker >= 0) & (body.paint[:, BOUNDS] == ON_ONE_SIDE))}
+        solids = body.solids
+        patched = np.flatnonzero((solids.marker >= 0) & (solids.paint[:, BOUNDS] == ON_ONE_SIDE))
+        self._patches = {int(solids.marker[solid]): int(solid) for solid in patched}
         for marker, solid in self._patches.items():
-            self._radii[marker] = math.sqrt(body.paint[solid, HALF] * body.paint[solid, ACROSS])
+            self._radii[marker] = math.sqrt(solids.paint[solid, HALF] * solids.paint[solid, ACROSS])
         row_time_s = 1e-9 * scene.row_time_ns
         middle_s = self.times_s + 0.5 * self._camera.height * row_time_s
         transforms, angles = shot.scene_object.source.sample(middle_s)
@@ -92,9 +104,9 @@ class _Eye:
         self._rolled = np.ones((len(self.times_s), body.marker_count))
         discs = self._discs(shot, body, placed, row_time_s)
         self.seen = np.empty((len(discs), body.marker_count, 3))
-        groups = np.array([body.group[list(body.marker).index(marker)] for marker in range(body.marker_count)])
-        hides = body.group <= PALM_GROUP  # what lies under paint does not hide it
-        visible_parts(np.stack([body.kind, body.group], axis=1)[hides], body.size[hides],
+        groups = np.array([solids.group[list(solids.marker).index(marker)] for marker in range(body.marker_count)])
+        hides = solids.group <= PALM_GROUP  # what lies under paint does not hide it
+        visible_parts(np.ascontiguousarray(solids.what[hides]), solids.size[hides],
                       np.ascontiguousarray(placed[:, hides]), groups, discs, spots(), self.seen)
         self._diameters = self._sizes(discs)
         self._places = self._middles(discs) + self._biases(shot, camera_seed(scene, index))
@@ -118,7 +130,7 @@ class _Eye:
             return np.zeros((3, 3))
         if role != WRIST_ROLE:
             return self._radii[marker] ** 2 * np.eye(3)
-        half_axes = body.size[list(body.marker).index(marker)]
+        half_axes = body.solids.size[list(body.solids.marker).index(marker)]
         turned = local[:, :3, :3] * half_axes
         return np.asarray(turned @ turned.transpose(0, 2, 1))
 
@@ -192,8 +204,8 @@ def _rolled(way: Callable[[Array], Array], see: Callable[[Array], Array], times_
 def _drawn_out(body: HandBody, placed: Array, marker: int) -> Array:
     """(F, 2) normalised: by how much the outline of a marker on the hand (`placed` as `HandBody.place`) is drawn out
     to either side of a disc: half of what lies between the ends of a capsule, as it is seen."""
-    solid = list(body.marker).index(marker)
-    if body.kind[solid] != CAPSULE:
+    solid = list(body.solids.marker).index(marker)
+    if body.solids.kind[solid] != CAPSULE:
         return np.zeros((len(placed), 2))
     start, end = placed[:, solid, :3], placed[:, solid, 3:6]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
@@ -204,7 +216,7 @@ def _drawn_out(body: HandBody, placed: Array, marker: int) -> Array:
 def _turned(body: HandBody, placed: Array, solid: int, places: Array) -> Array:
     """(F,) 1 in frames in which a patch on one side of a finger, `places` (F, 3) m in the camera's frame, shows; NaN
     where it is turned away."""
-    out = body.paint[solid, SIDE] * placed[:, solid, 6:9]
+    out = body.solids.paint[solid, SIDE] * placed[:, solid, 6:9]
     facing = -np.einsum("fi,fi->f", out, places) / np.linalg.norm(places, axis=1)
     return np.where(facing > _FACES, 1.0, np.nan)
 
@@ -239,19 +251,19 @@ def spots() -> Array:
 
 
 @njit(cache=True)
-def visible_parts(solids: Indices, sizes: Array, placed: Array, own: Indices, discs: Array, places: Array,
+def visible_parts(what: Indices, sizes: Array, placed: Array, own: Indices, discs: Array, places: Array,
                   seen: Array) -> None:
     """Fill `seen` (F, M, 3): the visible part 0..1 of each marker's disc and the middle of what is visible of it.
 
-    `solids` (N, 2): kind and group, `sizes` (N, 3) m, `placed` (F, N, 12) in the camera's frame, as in `HandBody`.
+    `what` (N, 3) and `sizes` (N, 3) m as in `body.Solids`, `placed` (F, N, 12) in the camera's frame.
     `own` (M,): the group that does not hide the marker: its own finger. `discs` (F, M, 6): normalised x and y of the
     middle, normalised radius, depth m, and normalised x and y of by how much the disc is drawn out to either side, as
     that of a capsule is; `places` (K, 2) in the unit disc. A disc that is NaN is not visible.
     """
-    table = np.empty((1, solids.shape[0], PREPARED))
+    table = np.empty((1, len(what), PREPARED))
     for f in range(placed.shape[0]):
-        for n in range(solids.shape[0]):
-            prepare(solids[n, 0], placed[f, n], sizes, table, 0, n)
+        for n in range(len(what)):
+            prepare(what[n, KIND], placed[f, n], sizes, table, 0, n)
         for m in range(own.shape[0]):
             x0, y0, radius, depth, along_x, along_y = discs[f, m]
             out = math.hypot(along_x, along_y)
@@ -263,8 +275,8 @@ def visible_parts(solids: Indices, sizes: Array, placed: Array, own: Indices, di
                 x = x0 + radius * places[k, 0] + drawn * along_x
                 y = y0 + radius * places[k, 1] + drawn * along_y
                 free = x == x
-                for n in range(solids.shape[0]):
-                    if free and solids[n, 1] != own[m] and hit(solids[n, 0], table, 0, n, x, y) < depth:
+                for n in range(len(what)):
+                    if free and what[n, GROUP] != own[m] and hit(what[n, KIND], table, 0, n, x, y) < depth:
                         free = False
                 if free:
                     count += 1

@@ -19,7 +19,7 @@ from rhot_app.simulator.bare_hand.painter import BareHand
 from rhot_app.simulator.film.film import TRUTH_NAME, Progress, new_folder
 from rhot_app.simulator.film.shot import Shot, make_renderer, save_shot
 from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
-from rhot_app.simulator.render.painter import Solids
+from rhot_app.simulator.render.painter import Body
 from rhot_app.simulator.render.sheet import Sheet, ruler_ends
 from rhot_app.simulator.scene.rigid_target import BoardPoses
 from rhot_app.simulator.scene.scene_description import RulerShow
@@ -120,9 +120,9 @@ def _samples(shot: Shot, index: int, t_s: float, visible: Array) -> dict[str, tu
     """A box on the paint of every marker that is seen whole."""
     if isinstance(shot.scene_object.thing, Sheet | BareHand):
         return {}
-    solids: Solids = shot.scene_object.thing
+    body: Body = shot.scene_object.thing
     camera = shot.scene.camera(index)
-    centres = solids.marker_positions(*shot.scene_object.source.sample(np.array([t_s])))[0]
+    centres = body.marker_positions(*shot.scene_object.source.sample(np.array([t_s])))[0]
     boxes = {}
     for marker, centre, part in zip(shot.scene.markers.markers, centres, visible, strict=True):
         (x, y), half = camera.project(centre)[0], _SAMPLE * camera.intrinsics[0] * _PAINT_M / centre[2]

@@ -14,13 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.errors import RigError
 from rhot_app.hand.dh import ROOT
-from rhot_app.hand.kinematics import forward, forward_arrays
+from rhot_app.hand.kinematics import forward, frames_and_points
 from rhot_app.hand.model import HandModel, neutral_pose
 from rhot_app.hand.places import KNUCKLE_ROLES, Place, dorsal, gap_middle, patch_of, place_of, segment_axis
 from rhot_app.hand.shape import segments
@@ -31,6 +32,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CAPSULE, CYLINDER = 0, 1
+KIND, GROUP, MARKER = range(3)
+"""Columns of `Solids.what`."""
+
 PARAMETERS = 12
 SKIN = -1
 PALM_GROUP = len(FINGERS)
@@ -62,25 +66,47 @@ _BONE_ENDS = {"metacarpal": 1, "proximal": 1, "medial": 2, "neck": 2, "distal": 
 _THUMB_BONE_ENDS = {**_BONE_ENDS, "proximal": 2}
 
 
-@dataclass(frozen=True, slots=True)
-class HandBody:
-    """The solids of one hand wearing one marker set: N solids, painted ones first, and M markers.
+class Solids(NamedTuple):
+    """N solids, painted ones first.
 
-    `kind`, `group`, `marker` (N,): what it is, which part of the hand, index in the marker set or SKIN. `size`
+    `what` (N, 3): what it is (CAPSULE, CYLINDER), which part of the hand, index in the marker set or SKIN. `size`
     (N, 3) m: capsule (radius, 0, 0), cylinder (half length, half breadth, half thickness). `rgb` (N, 3) 0..255.
-    `margin` (N,) m: by how much paint wins over skin of its own group. `paint` (N, PAINT_FIELDS). `row` (N,): kinematic
-    row that carries the solid, `ends` (N, 2, 3) m: a capsule's ends, a cylinder's centre, and `up` (N, 3), the unit
-    vector across a capsule to the back of the hand, in that row's frame. `places` (M,): where the markers sit.
+    `margin` (N,) m: by how much paint wins over skin of its own group. `paint` (N, PAINT_FIELDS).
     """
 
-    model: HandModel
-    kind: Indices
-    group: Indices
-    marker: Indices
+    what: Indices
     size: Array
     rgb: Array
     margin: Array
     paint: Array
+
+    @property
+    def kind(self) -> Indices:
+        """(N,)."""
+        return self.what[:, KIND]
+
+    @property
+    def group(self) -> Indices:
+        """(N,)."""
+        return self.what[:, GROUP]
+
+    @property
+    def marker(self) -> Indices:
+        """(N,)."""
+        return self.what[:, MARKER]
+
+
+@dataclass(frozen=True, slots=True)
+class HandBody:
+    """One hand wearing one marker set: N `solids` and M markers.
+
+    `row` (N,): kinematic row that carries the solid, `ends` (N, 2, 3) m: a capsule's ends, a cylinder's centre, and
+    `up` (N, 3), the unit vector across a capsule to the back of the hand, in that row's frame. `places` (M,): where the
+    markers sit.
+    """
+
+    model: HandModel
+    solids: Solids
     row: Indices
     ends: Array
     up: Array
@@ -93,7 +119,7 @@ class HandBody:
 
     def joints_and_markers(self, world_from_palm: Array, angles: Array) -> tuple[Array, Array]:
         """(T, 21, 3) m joints and (T, M, 3) m marker centres for poses (T, 4, 4) and (T, 21)."""
-        frames, points = self._forward(world_from_palm, angles)
+        frames, points = frames_and_points(self.model.dh, world_from_palm, angles)
         worn = frames[:, [place.row for place in self.places]]
         offsets = np.array([place.point for place in self.places])
         return points[:, :len(JOINTS)], np.einsum("tmij,mj->tmi", worn[..., :3], offsets) + worn[..., 3]
@@ -106,30 +132,20 @@ class HandBody:
         """(T, 4, 4) m: the segment that carries a marker, its origin at the marker's centre, for poses (T, 4, 4) and
         (T, 21)."""
         out = np.tile(np.eye(4), (len(angles), 1, 1))
-        out[:, :3] = self._forward(world_from_palm, angles)[0][:, self.places[marker].row]
+        out[:, :3] = frames_and_points(self.model.dh, world_from_palm, angles)[0][:, self.places[marker].row]
         out[:, :3, 3] = self.marker_positions(world_from_palm, angles)[:, marker]
         return out
 
     def place(self, world_from_palm: Array, angles: Array) -> Array:
         """(T, N, 12) parameters of the solids in the world for poses (T, 4, 4) and (T, 21)."""
-        frames = self._forward(world_from_palm, angles)[0][:, self.row]
-        out = np.zeros((len(angles), len(self.kind), PARAMETERS))
+        frames = frames_and_points(self.model.dh, world_from_palm, angles)[0][:, self.row]
+        out = np.zeros((len(angles), len(self.row), PARAMETERS))
         out[:, :, :6] = (np.einsum("tnij,nkj->tnki", frames[..., :3], self.ends)
                          + frames[:, :, None, :, 3]).reshape(len(angles), -1, 6)
         out[:, :, 6:9] = np.einsum("tnij,nj->tni", frames[..., :3], self.up)
-        round_ones = self.kind == CYLINDER
-        out[:, round_ones, 3:] = world_from_palm[:, None, :3, :3].transpose(0, 1, 3, 2).reshape(-1, 1, 9)
+        axes = world_from_palm[:, None, :3, :3].transpose(0, 1, 3, 2)
+        out[:, self.solids.kind == CYLINDER, 3:] = axes.reshape(-1, 1, 9)
         return out
-
-    def _forward(self, world_from_palm: Array, angles: Array) -> tuple[Array, Array]:
-        """(T, R + 1, 3, 4) frames of the rows, the palm's last so that ROOT finds it, and (T, 26, 3) points."""
-        dh = self.model.dh
-        frames = np.empty((len(angles), len(dh.parent) + 1, 3, 4))
-        points = np.empty((len(angles), len(dh.point_row), 3))
-        for k in range(len(angles)):
-            forward_arrays(dh, world_from_palm[k], angles[k], frames[k, :-1], points[k])
-        frames[:, ROOT] = world_from_palm[:, :3]
-        return frames, points
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,13 +193,11 @@ def build_body(model: HandModel, markers: MarkerSet, hidden: frozenset[str] = fr
                *(SKIN_RGB if name == FOREARM else bare for name in skin)]
     return HandBody(
         model=model,
-        kind=np.array([solid.kind for solid in solids], dtype=np.int64),
-        group=np.array([solid.group for solid in solids], dtype=np.int64),
-        marker=np.array([solid.marker for solid in solids], dtype=np.int64),
-        size=np.array([solid.size for solid in solids]),
-        rgb=np.array(colours, dtype=np.float64),
-        margin=np.array([_margin(solid) * max(solid.size) for solid in solids]),
-        paint=np.array([_paint_row(solid, look) for solid in solids]),
+        solids=Solids(np.array([(solid.kind, solid.group, solid.marker) for solid in solids], np.int64),
+                      size=np.array([solid.size for solid in solids]),
+                      rgb=np.array(colours, dtype=np.float64),
+                      margin=np.array([_margin(solid) * max(solid.size) for solid in solids]),
+                      paint=np.array([_paint_row(solid, look) for solid in solids])),
         row=np.array([solid.row for solid in solids], dtype=np.int64),
         ends=np.array([solid.ends for solid in solids]),
         up=np.array([solid.up for solid in solids]),
@@ -261,10 +275,7 @@ def _rest(marker: Marker, painted: _Solid) -> _Solid | None:
 def _skin(model: HandModel) -> Iterator[tuple[str, _Solid]]:
     """Every capsule of the hand's shape, taken to the frame of the bone it rides on; an elliptic forearm."""
     pose = neutral_pose()
-    frames = np.zeros((len(model.dh.parent) + 1, 3, 4))
-    points = np.empty((len(model.dh.point_row), 3))
-    forward_arrays(model.dh, pose.world_from_palm, pose.angles, frames[:-1], points)
-    frames[ROOT] = pose.world_from_palm[:3]
+    frames = frames_and_points(model.dh, pose.world_from_palm[None], pose.angles[None])[0][0]
     shape = segments(model, pose, forward(model, pose))
     for name, start, end, radius in zip(shape.names, shape.start, shape.end, shape.radius, strict=True):
         part, _, bone = name.partition("_")

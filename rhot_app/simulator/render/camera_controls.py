@@ -6,8 +6,8 @@ The units are libcamera's, so that a setting found on the twin means the same on
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Annotated, Final
+from collections.abc import Iterable
+from typing import Annotated, Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -83,8 +83,6 @@ def _planck_xyz(kelvin: float) -> Array:
 
 # -- camera settings ---------------------------------------------------------------------------------------------------
 
-Image = NDArray[np.float32]
-
 FULL: Final = 255.0
 _MID_GREY: Final = 128.0
 _BT601: Final = np.array([[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
@@ -121,20 +119,21 @@ def controls_of(camera: CameraSettings) -> Controls:
         contrast=within(camera.contrast, 1.0, 0.0, 32.0))
 
 
-@dataclass(frozen=True, slots=True)
-class Development:
+Triple = tuple[np.float32, np.float32, np.float32]
+
+
+class Development(NamedTuple):
     """From the sensor's grey levels (red, green, blue) to Y, U and V: `mix` @ min(`white` * level, `full`) + `offset`.
 
-    `white`, `full`, `offset` (3,), `mix` (3, 3). `read` and `shot`: noise variance of a channel before `white` is
-    read + shot * level, grey levels squared.
+    `read` and `shot`: noise variance of a channel before `white` is read + shot * level, grey levels squared.
     """
 
-    white: Image
-    full: Image
-    mix: Image
-    offset: Image
-    read: float
-    shot: float
+    white: Triple
+    full: Triple
+    mix: tuple[Triple, Triple, Triple]
+    offset: Triple
+    read: np.float32
+    shot: np.float32
 
 
 def development(controls: Controls, noise_mid_grey: float, noise_read: float) -> Development:
@@ -148,6 +147,11 @@ def development(controls: Controls, noise_mid_grey: float, noise_read: float) ->
     luma = _MID_GREY * (1.0 - controls.contrast + controls.brightness)
     shot = max(noise_mid_grey**2 - noise_read**2, 0.0) / _MID_GREY
     return Development(
-        white=white.astype(np.float32), full=(FULL * np.minimum(white, 1.0)).astype(np.float32),
-        mix=mix.astype(np.float32), offset=np.array([luma, _MID_GREY, _MID_GREY], dtype=np.float32),
-        read=(controls.gain * noise_read)**2, shot=controls.gain * shot)
+        white=_triple(white), full=_triple(FULL * np.minimum(white, 1.0)),
+        mix=(_triple(mix[0]), _triple(mix[1]), _triple(mix[2])), offset=_triple([luma, _MID_GREY, _MID_GREY]),
+        read=np.float32((controls.gain * noise_read)**2), shot=np.float32(controls.gain * shot))
+
+
+def _triple(values: Iterable[float]) -> Triple:
+    a, b, c = (np.float32(value) for value in values)
+    return a, b, c

@@ -68,8 +68,8 @@ def power_series(values: Array) -> Array:
 
 
 @njit(cache=True, fastmath=True)
-def evaluate(series: Array, n: int, tau: float, count: int, row: Array) -> None:
-    """The first `count` parameters of row `n` of a series at `tau`, into `row`."""
-    for k in range(count):
+def evaluate(series: Array, n: int, tau: float, row: Array) -> None:
+    """The parameters of row `n` of a series at `tau`, into `row`."""
+    for k in range(len(row)):
         row[k] = (((series[n, k, 4] * tau + series[n, k, 3]) * tau + series[n, k, 2]) * tau
                   + series[n, k, 1]) * tau + series[n, k, 0]

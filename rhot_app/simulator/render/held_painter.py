@@ -15,7 +15,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import BoxShape, ObjectModel, Tag, load_object
 from rhot_app.simulator.render.exposure_samples import FrameTime
-from rhot_app.simulator.render.painter import Box, Image, PoseSource, Solids
+from rhot_app.simulator.render.painter import Body, Box, Image, PoseSource
 from rhot_app.simulator.render.sheet import tag_sheet
 from rhot_app.simulator.render.sheet_painter import SheetPainter
 from rhot_app.simulator.render.solids_painter import SolidsPainter
@@ -49,7 +49,7 @@ class _Riding:
 class HeldPainter:
     """A `Painter` of a hand and a box with a tag on each face. A marker whose centre lies behind the box is hidden."""
 
-    def __init__(self, body: Solids, held: ObjectModel, camera: CameraModel, background: Image, shading: float,
+    def __init__(self, body: Body, held: ObjectModel, camera: CameraModel, background: Image, shading: float,
                  seed: int) -> None:
         """`shading`: share of the brightness that depends on how a surface faces the lamp."""
         assert isinstance(held.shape, BoxShape)

@@ -36,17 +36,16 @@ CHIP_M, BLOTCH_M = 2e-3, 8e-3
 
 
 @njit(cache=True, fastmath=True)
-def local_point(kind: int, p: Array, s: int, n: int, x: float, y: float, t: float, sizes: Array,
-                up: Array) -> tuple[float, float, float]:
+def local_point(kind: int, p: Array, s: int, n: int, x: float, y: float, t: float) -> tuple[float, float, float]:
     """Along, across and up, m, of the point at depth `t` on the ray (x, y, 1), which meets the solid in row (s, n) of
-    the prepared table `p`; `up` (S, N, 3) unit vectors of capsules."""
+    the prepared table `p`."""
     if kind != CAPSULE:
-        return (sizes[n, 0] * (p[s, n, 9] + t * (p[s, n, 0] * x + p[s, n, 1] * y + p[s, n, 2])),
-                sizes[n, 1] * (p[s, n, 10] + t * (p[s, n, 3] * x + p[s, n, 4] * y + p[s, n, 5])),
-                sizes[n, 2] * (p[s, n, 11] + t * (p[s, n, 6] * x + p[s, n, 7] * y + p[s, n, 8])))
+        return (p[s, n, 12] * (p[s, n, 9] + t * (p[s, n, 0] * x + p[s, n, 1] * y + p[s, n, 2])),
+                p[s, n, 13] * (p[s, n, 10] + t * (p[s, n, 3] * x + p[s, n, 4] * y + p[s, n, 5])),
+                p[s, n, 14] * (p[s, n, 11] + t * (p[s, n, 6] * x + p[s, n, 7] * y + p[s, n, 8])))
     length = math.sqrt(p[s, n, 6])
     ax, ay, az = p[s, n, 3] / length, p[s, n, 4] / length, p[s, n, 5] / length
-    ux, uy, uz = up[s, n, 0], up[s, n, 1], up[s, n, 2]
+    ux, uy, uz = p[s, n, 11], p[s, n, 12], p[s, n, 13]
     dx, dy, dz = t * x - p[s, n, 0], t * y - p[s, n, 1], t - p[s, n, 2]
     across = dx * (uy * az - uz * ay) + dy * (uz * ax - ux * az) + dz * (ux * ay - uy * ax)
     return dx * ax + dy * ay + dz * az, across, dx * ux + dy * uy + dz * uz

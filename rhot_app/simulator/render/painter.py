@@ -1,5 +1,5 @@
-"""What a painter is: it puts something that moves over the background of one camera, at the times of a frame.
-keeps what another one painted, so that a study renders each sequence once.
+"""What a painter is: it puts something that moves over the background of one camera, at the times of a frame. One keeps
+what another one painted, so that a study renders each sequence once.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.simulator.render.body import Solids
 from rhot_app.simulator.render.exposure_samples import FrameTime
 from rhot_node.pictures import decode_picture
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Image = NDArray[np.float32]
 Box = tuple[int, int, int, int]
 """Pixels x0 <= x < x1, y0 <= y < y1; (0, 0, 0, 0) when there are none."""
@@ -33,23 +33,11 @@ class PoseSource(Protocol):
         ...
 
 
-class Solids(Protocol):
-    """Capsules and cylinders that some pose places in the world, painted ones first; fields as of `body.HandBody`."""
+class Body(Protocol):
+    """Capsules and cylinders that some pose places in the world."""
 
     @property
-    def kind(self) -> Indices: ...
-    @property
-    def group(self) -> Indices: ...
-    @property
-    def marker(self) -> Indices: ...
-    @property
-    def size(self) -> Array: ...
-    @property
-    def rgb(self) -> Array: ...
-    @property
-    def margin(self) -> Array: ...
-    @property
-    def paint(self) -> Array: ...
+    def solids(self) -> Solids: ...
     @property
     def marker_count(self) -> int: ...
 

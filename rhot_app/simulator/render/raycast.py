@@ -1,8 +1,8 @@
 """Rays against the solids of a hand (numba). The ray starts at the camera's centre with direction (x, y, 1), so that
 the ray parameter is the depth along the optical axis, m.
 
-`prepare` turns a parameter row (see body.py) into the numbers that `hit` wants, in one row of a table (S, N, 12): S
-moments, N solids. The functions take the whole table and indices because numba counts references of every view.
+`prepare` turns a parameter row (see body.py) into the numbers that `hit` wants, in one row of a table (S, N, PREPARED):
+S moments, N solids. The functions take the whole table and indices because numba counts references of every view.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rhot_app.simulator.render.body import CAPSULE
 
 Array = NDArray[np.float64]
 
-PREPARED = 12
+PREPARED = 15
 NO_HIT = 1e30
 
 
@@ -36,12 +36,14 @@ def prepare(kind: int, row: Array, sizes: Array, table: Array, s: int, n: int) -
         table[s, n, 8] = length2 * away2 - along * along - radius2 * length2
         table[s, n, 9] = away2 - radius2
         table[s, n, 10] = row[3] * row[3] + row[4] * row[4] + row[5] * row[5] - radius2
+        table[s, n, 11], table[s, n, 12], table[s, n, 13] = row[6], row[7], row[8]
     else:
         for axis in range(3):
             inverse = 1.0 / sizes[n, axis]
             x, y, z = row[3 + 3 * axis] * inverse, row[4 + 3 * axis] * inverse, row[5 + 3 * axis] * inverse
             table[s, n, 3 * axis], table[s, n, 3 * axis + 1], table[s, n, 3 * axis + 2] = x, y, z
             table[s, n, 9 + axis] = -(x * row[0] + y * row[1] + z * row[2])
+            table[s, n, 12 + axis] = sizes[n, axis]
 
 
 @njit(cache=True, fastmath=True, inline="always")

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rhot_app.geometry.camera import REACH, project_ray, undistort_point
-from rhot_app.simulator.render.body import BOUNDS, CAPSULE, PLAIN
+from rhot_app.simulator.render.body import BOUNDS, CAPSULE, KIND, PARAMETERS, PLAIN, Solids
 from rhot_app.simulator.render.exposure_samples import evaluate
 from rhot_app.simulator.render.paint import is_painted, local_point
 from rhot_app.simulator.render.raycast import NO_HIT, PREPARED, hit, prepare
@@ -19,12 +19,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 NEAR_M = 0.03  # what comes nearer to the camera's plane is not drawn
-
-
-@njit(cache=True, inline="always")
-def parameters_of(kind: int) -> int:
-    """How many numbers place a solid (see body.py)."""
-    return 6 if kind == CAPSULE else 12
 
 
 @njit(cache=True)
@@ -100,17 +94,17 @@ def in_block(active: Indices, actives: int, scanline_bounds: Indices, y: int, x:
 
 
 @njit(cache=True)
-def area_outside(coefficients: Array, n: int, kind: int, size: Array, paint: Array, intrinsics: Array, timing: Array,
-                 width: int, height: int, limits: Indices) -> float:
+def area_outside(series: Array, n: int, solids: Solids, intrinsics: Array, timing: Array, width: int, height: int,
+                 limits: Indices) -> float:
     """Area, px^2, of what is painted of solid `n` beyond the image borders, within `limits` (x0, y0, x1, y1): one
     ray per pixel."""
-    row, prepared, up = np.empty(12), np.empty((1, len(size), PREPARED)), np.empty((1, len(size), 3))
+    kind, size, paint = solids.what[n, KIND], solids.size, solids.paint
+    row, prepared = np.empty(PARAMETERS), np.empty((1, len(size), PREPARED))
     area, partly = 0.0, paint[n, BOUNDS] != PLAIN
     for y in range(limits[1], limits[3]):
         tau = min(max(timing[0] + y * timing[1], -1.2), 1.2)
-        evaluate(coefficients, n, tau, 12 if partly else parameters_of(kind), row)
+        evaluate(series, n, tau, row)
         prepare(kind, row, size, prepared, 0, n)
-        up[0, n, 0], up[0, n, 1], up[0, n, 2] = row[6], row[7], row[8]
         for x in range(limits[0], limits[2]):
             if 0 <= x < width and 0 <= y < height:
                 continue
@@ -120,7 +114,7 @@ def area_outside(coefficients: Array, n: int, kind: int, size: Array, paint: Arr
             t = hit(kind, prepared, 0, n, rx, ry)
             if t < NO_HIT:
                 if partly:
-                    along, across, above = local_point(kind, prepared, 0, n, rx, ry, t, size, up)
+                    along, across, above = local_point(kind, prepared, 0, n, rx, ry, t)
                     if not is_painted(paint, n, along, across, above):
                         continue
                 area += 1.0

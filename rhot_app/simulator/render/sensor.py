@@ -13,11 +13,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.simulator.render.camera_controls import Development
+from rhot_app.simulator.render.camera_controls import Development, Triple
 
 Image = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Box = tuple[int, int, int, int]
+Planes = tuple[Image, Image, Image]
+"""Of Y (H, W), U and V (H / 2, W / 2)."""
 
 _TABLE_BITS = 20
 _REACH = 3  # px, half width of the point spread kernel
@@ -34,8 +36,7 @@ class Sensor:
         self._random = np.random.default_rng([seed, 78])
         self._blurred = np.empty_like(background)
         self._work = np.empty_like(background)
-        self._means = [np.empty(shape, np.float32) for shape in _plane_shapes(width, height)]
-        self._sigmas = [np.empty(shape, np.float32) for shape in _plane_shapes(width, height)]
+        self._means, self._sigmas = _empty_planes(width, height), _empty_planes(width, height)
         self.adjust(background, development)
 
     def adjust(self, background: Image, development: Development) -> None:
@@ -60,11 +61,8 @@ class Sensor:
             self._restore(grown)
 
     def _develop(self, image: Image, box: Box) -> None:
-        x0, y0, x1, y1 = box
-        blur(image, self._kernel, x0, y0, x1, y1, self._work, self._blurred)
-        how = self._development
-        to_planes(self._blurred, how.white, how.full, how.mix, how.offset, how.read, how.shot, x0, y0, x1, y1,
-                  *self._means, *self._sigmas)
+        blur(image, self._kernel, box, self._work, self._blurred)
+        to_planes(self._blurred, self._development, box, self._means, self._sigmas)
 
     def _restore(self, box: Box) -> None:
         x0, y0, x1, y1 = box
@@ -90,13 +88,15 @@ def psf_kernel(sigma_px: float) -> Image:
     return np.asarray(taps / taps.sum(), dtype=np.float32)
 
 
-def _plane_shapes(width: int, height: int) -> tuple[tuple[int, int], ...]:
-    return (height, width), (height // 2, width // 2), (height // 2, width // 2)
+def _empty_planes(width: int, height: int) -> Planes:
+    half = height // 2, width // 2
+    return np.empty((height, width), np.float32), np.empty(half, np.float32), np.empty(half, np.float32)
 
 
 @njit(cache=True, fastmath=True)
-def blur(image: Image, kernel: Image, x0: int, y0: int, x1: int, y1: int, work: Image, out: Image) -> None:
+def blur(image: Image, kernel: Image, box: Box, work: Image, out: Image) -> None:
     """Separable convolution of `image` (3, H, W) into `out` inside the box; borders repeat the edge pixel."""
+    x0, y0, x1, y1 = box
     _, height, width = image.shape
     reach = len(kernel) // 2
     left, right = max(x0 - reach, 0), min(x1 + reach, width)
@@ -138,36 +138,43 @@ def _blur_border(source: Image, kernel: Image, x0: int, x1: int, result: Image) 
 
 
 @njit(cache=True, fastmath=True)
-def to_planes(rgb: Image, white: Image, full: Image, mix: Image, offset: Image, read: float, shot: float, x0: int,
-              y0: int, x1: int, y1: int, luma: Image, cb: Image, cr: Image, sigma_luma: Image, sigma_cb: Image,
-              sigma_cr: Image) -> None:
-    """Means and standard deviations of Y, U, V inside an even box; the first seven say how (see `Development`)."""
-    f = np.float32
-    wr, wg, wb, fr, fg, fb = white[0], white[1], white[2], full[0], full[1], full[2]
-    # Variance of a channel, white balance included: base + slope * level.
-    base_r, base_g, base_b = f(read) * wr * wr, f(read) * wg * wg, f(read) * wb * wb
-    slope_r, slope_g, slope_b = f(shot) * wr, f(shot) * wg, f(shot) * wb
-    yr, yg, yb, y_off = mix[0, 0], mix[0, 1], mix[0, 2], offset[0]
-    ur, ug, ub, u_off = mix[1, 0], mix[1, 1], mix[1, 2], offset[1]
-    vr, vg, vb, v_off = mix[2, 0], mix[2, 1], mix[2, 2], offset[2]
+def to_planes(rgb: Image, how: Development, box: Box, means: Planes, sigmas: Planes) -> None:
+    """Means and standard deviations of Y, U and V inside an even box."""
+    x0, y0, x1, y1 = box
+    wr, wg, wb = how.white
+    fr, fg, fb = how.full
+    (luma, cb, cr), (sigma_luma, sigma_cb, sigma_cr) = means, sigmas
     for y in range(y0, y1):
         for x in range(x0, x1):
             r, g, b = min(wr * rgb[0, y, x], fr), min(wg * rgb[1, y, x], fg), min(wb * rgb[2, y, x], fb)
-            luma[y, x] = yr * r + yg * g + yb * b + y_off
-            sigma_luma[y, x] = math.sqrt(yr * yr * (base_r + slope_r * r) + yg * yg * (base_g + slope_g * g)
-                                         + yb * yb * (base_b + slope_b * b))
-    quarter = f(0.25)
+            luma[y, x] = _mixed(how.mix[0], r, g, b) + how.offset[0]
+            sigma_luma[y, x] = _sigma(how.mix[0], how, r, g, b)
+    half, quarter = np.float32(0.5), np.float32(0.25)
     for y in range(y0 // 2, y1 // 2):
         for x in range(x0 // 2, x1 // 2):
             j, i = 2 * y, 2 * x
             r = min(quarter * wr * (rgb[0, j, i] + rgb[0, j, i + 1] + rgb[0, j + 1, i] + rgb[0, j + 1, i + 1]), fr)
             g = min(quarter * wg * (rgb[1, j, i] + rgb[1, j, i + 1] + rgb[1, j + 1, i] + rgb[1, j + 1, i + 1]), fg)
             b = min(quarter * wb * (rgb[2, j, i] + rgb[2, j, i + 1] + rgb[2, j + 1, i] + rgb[2, j + 1, i + 1]), fb)
-            cb[y, x] = ur * r + ug * g + ub * b + u_off
-            cr[y, x] = vr * r + vg * g + vb * b + v_off
-            nr, ng, nb = base_r + slope_r * r, base_g + slope_g * g, base_b + slope_b * b
-            sigma_cb[y, x] = f(0.5) * math.sqrt(ur * ur * nr + ug * ug * ng + ub * ub * nb)
-            sigma_cr[y, x] = f(0.5) * math.sqrt(vr * vr * nr + vg * vg * ng + vb * vb * nb)
+            cb[y, x] = _mixed(how.mix[1], r, g, b) + how.offset[1]
+            cr[y, x] = _mixed(how.mix[2], r, g, b) + how.offset[2]
+            sigma_cb[y, x] = half * _sigma(how.mix[1], how, r, g, b)
+            sigma_cr[y, x] = half * _sigma(how.mix[2], how, r, g, b)
+
+
+@njit(cache=True, fastmath=True, inline="always")
+def _mixed(mix: Triple, r: float, g: float, b: float) -> float:
+    return mix[0] * r + mix[1] * g + mix[2] * b
+
+
+@njit(cache=True, fastmath=True, inline="always")
+def _sigma(mix: Triple, how: Development, r: float, g: float, b: float) -> float:
+    """Standard deviation of a mixture of channels, each of which has the variance base + slope * level."""
+    wr, wg, wb = how.white
+    nr = how.read * wr * wr + how.shot * wr * r
+    ng = how.read * wg * wg + how.shot * wg * g
+    nb = how.read * wb * wb + how.shot * wb * b
+    return math.sqrt(mix[0] * mix[0] * nr + mix[1] * mix[1] * ng + mix[2] * mix[2] * nb)
 
 
 @njit(cache=True, fastmath=True)

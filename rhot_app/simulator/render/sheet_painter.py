@@ -53,7 +53,7 @@ def trace_sheet(series: Array, printed: Print, rays: Array, timing: Array, movin
         shade = 0.0
         for k in range(slots):
             offset = ((k + 0.5) / slots - 0.5) * timing[2]
-            evaluate(series, 0, timing[0] + y * timing[1] + offset, FRAME, row)
+            evaluate(series, 0, timing[0] + y * timing[1] + offset, row)
             shade = 1.0 - shading * (1.0 - _plane_map(row, light, maps, k))
         for x in range(box[0], box[2]):
             level = _level_around(printed, maps, slots, rays, x, y)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.simulator.render.body import CAPSULE
 from rhot_app.simulator.render.exposure_samples import NODES, FrameTime, power_series
-from rhot_app.simulator.render.painter import Box, Image, PoseSource, Solids
+from rhot_app.simulator.render.painter import Body, Box, Image, PoseSource
 from rhot_app.simulator.render.rays import light_direction, ray_table
 from rhot_app.simulator.render.scanline_bounds import area_outside, outline
 from rhot_app.simulator.render.trace import Moving, View, canvas, trace
@@ -22,14 +22,13 @@ class SolidsPainter:
     """A `Painter` of solids. A marker's visible part is that of its unhidden area, 0 when it is not in front of the
     camera at all."""
 
-    def __init__(self, body: Solids, camera: CameraModel, background: Image, shading: float, seed: int) -> None:
+    def __init__(self, body: Body, camera: CameraModel, background: Image, shading: float, seed: int) -> None:
         """`shading`: share of the brightness that depends on how a surface faces the lamp."""
         self._body, self._camera, self._shading, self._seed = body, camera, shading, seed
-        self._meta = np.stack([body.kind, body.group, body.marker], axis=1)
-        self._rgb, self._paint = body.rgb, body.paint
+        self._solids = body.solids
         self._rays = ray_table(camera)
         self._light = light_direction(camera)
-        self._canvas = canvas(background, len(body.kind), body.marker_count)
+        self._canvas = canvas(background, len(body.solids.kind), body.marker_count)
 
     @property
     def image(self) -> Image:
@@ -38,32 +37,27 @@ class SolidsPainter:
 
     def relight(self, background: Image, level: Array) -> None:
         """Another light: the `background` as it is lit now, and factors (3,) on the grey levels of everything else."""
-        self._canvas = canvas(background, len(self._body.kind), self._body.marker_count)
-        self._rgb = self._body.rgb * level
+        solids = self._body.solids
+        self._canvas = canvas(background, len(solids.kind), self._body.marker_count)
+        self._solids = solids._replace(rgb=solids.rgb * level)
 
     def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
         """Paint the solids as `source` moves them during the frame."""
-        body, camera = self._body, self._camera
-        series = self._series(source, time)
+        world_from_palm, angles = source.sample(time.nodes_s)
+        series = power_series(self._body.place(self._camera.camera_from_world @ world_from_palm, angles))
         timing = time.timing
-        moving = Moving(series, self._meta, body.size, self._rgb, body.margin, self._paint,
-                        self._sweep(series, timing[2]))
-        view = View(self._rays, camera.intrinsics, timing, self._light, self._shading)
+        moving = Moving(series, self._solids, self._sweep(series, timing[2]))
+        view = View(self._rays, self._camera.intrinsics, timing, self._light, self._shading)
         box = trace(moving, view, self._canvas, self._seed * 1_000_003 + number)
         whole = self._canvas.whole + self._outside(series, timing)
         fractions = np.divide(self._canvas.visible, whole, out=np.zeros_like(whole), where=whole > 0.0)
         return box, np.clip(fractions, 0.0, 1.0)
 
-    def _series(self, source: PoseSource, time: FrameTime) -> Array:
-        """(N, 12, NODES) power series of the solids' parameters in the camera's frame."""
-        world_from_palm, angles = source.sample(time.nodes_s)
-        return power_series(self._body.place(self._camera.camera_from_world @ world_from_palm, angles))
-
     def _sweep(self, series: Array, exposure_tau: float) -> Array:
         """(N, 2) px: the farthest that a solid's end travels in x and y during one exposure."""
         fx, fy = self._camera.intrinsics[:2]
         sweep = np.zeros((len(series), 2))
-        axis = np.where(self._body.kind == CAPSULE, 0.0, self._body.size[:, 0])[:, None]
+        axis = np.where(self._solids.kind == CAPSULE, 0.0, self._solids.size[:, 0])[:, None]
         for tau in (-0.8, 0.0, 0.8):
             before, after = ((series @ (tau + offset) ** np.arange(NODES))
                              for offset in (-0.5 * exposure_tau, 0.5 * exposure_tau))
@@ -77,16 +71,16 @@ class SolidsPainter:
     def _end(self, parameters: Array, first: int, half_length: Array) -> Array:
         """(N, 3) m: one of the two ends of every solid."""
         cylinder = parameters[:, :3] + (1.0 if first else -1.0) * half_length * parameters[:, 3:6]
-        return np.where((self._body.kind == CAPSULE)[:, None], parameters[:, first:first + 3], cylinder)
+        return np.where((self._solids.kind == CAPSULE)[:, None], parameters[:, first:first + 3], cylinder)
 
     def _outside(self, series: Array, timing: Array) -> Array:
         """(M,) px^2 of each marker beyond the image's borders."""
-        body, width, height = self._body, self._camera.width, self._camera.height
+        solids, width, height = self._solids, self._camera.width, self._camera.height
         intrinsics = self._camera.intrinsics
-        outside = np.zeros(body.marker_count)
-        for n in range(int((body.marker >= 0).sum())):  # painted solids come first
+        outside = np.zeros(self._body.marker_count)
+        for n in range(int((solids.marker >= 0).sum())):  # painted solids come first
             row = series[n, :, 0].copy()
-            u0, v0, u1, v1, reach = outline(body.kind[n], row, body.size, n, intrinsics)
+            u0, v0, u1, v1, reach = outline(solids.kind[n], row, solids.size, n, intrinsics)
             if not reach > 0.0:
                 continue
             x0, x1, y0, y1 = min(u0, u1) - reach, max(u0, u1) + reach, min(v0, v1) - reach, max(v0, v1) + reach
@@ -94,6 +88,5 @@ class SolidsPainter:
                 continue
             limits = np.array([max(x0 - 2, -_OUTSIDE), max(y0 - 2, -_OUTSIDE), min(x1 + 3, width + _OUTSIDE),
                                min(y1 + 3, height + _OUTSIDE)]).astype(np.int64)
-            outside[body.marker[n]] = area_outside(series, n, body.kind[n], body.size, self._paint, intrinsics,
-                                                   timing, width, height, limits)
+            outside[solids.marker[n]] = area_outside(series, n, solids, intrinsics, timing, width, height, limits)
         return outside

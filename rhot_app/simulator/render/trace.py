@@ -14,12 +14,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.simulator.render.body import BOUNDS, PLAIN, REST_GROUP, UNEVEN
+from rhot_app.simulator.render.body import BOUNDS, GROUP, KIND, MARKER, PARAMETERS, PLAIN, REST_GROUP, UNEVEN, Solids
 from rhot_app.simulator.render.exposure_samples import STILL_PX, evaluate
 from rhot_app.simulator.render.paint import is_painted, local_point, paint_level
 from rhot_app.simulator.render.raycast import NO_HIT, PREPARED, hit, lambert, prepare
 from rhot_app.simulator.render.rays import SAMPLES, scatter
-from rhot_app.simulator.render.scanline_bounds import in_block, parameters_of, span
+from rhot_app.simulator.render.scanline_bounds import in_block, span
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -31,19 +31,19 @@ in other colours than a marker's, then markers."""
 
 
 @njit(cache=True, inline="always")
-def id_of(meta: Indices, n: int) -> int:
-    """What a pixel shows where solid `n` is: `meta` (N, 3) kind, group, marker."""
-    if meta[n, 2] >= 0:
-        return PAINT_ID + meta[n, 2]
-    return SKIN_ID + meta[n, 0] + (2 if meta[n, 1] == REST_GROUP else 0)
+def id_of(what: Indices, n: int) -> int:
+    """What a pixel shows where solid `n` is: `Solids.what` (N, 3)."""
+    if what[n, MARKER] >= 0:
+        return PAINT_ID + what[n, MARKER]
+    return SKIN_ID + what[n, KIND] + (2 if what[n, GROUP] == REST_GROUP else 0)
 
 
 @njit(cache=True)
-def reach_by_id(meta: Indices, sweep: Array) -> Indices:
+def reach_by_id(what: Indices, sweep: Array) -> Indices:
     """(128, 2) px around a change of id, by id, that the exposure may sweep."""
     reach = np.zeros((128, 2), np.int64)
-    for n in range(len(meta)):
-        code = id_of(meta, n)
+    for n in range(len(sweep)):
+        code = id_of(what, n)
         for axis in range(2):
             pixels = math.ceil(0.5 * sweep[n, axis]) if sweep[n, axis] > STILL_PX else 0
             reach[code, axis] = max(reach[code, axis], pixels)
@@ -77,19 +77,11 @@ def mark_edges(ids: NDArray[np.int8], edges: NDArray[np.uint8], rows: Indices, t
 # -- two passes --------------------------------------------------------------------------------------------------------
 
 class Moving(NamedTuple):
-    """N solids during one frame, painted ones first.
-
-    `series` (N, 12, NODES): their parameters in the camera's frame. `meta` (N, 3): kind, group, marker. `size` (N,
-    3), `rgb` (N, 3), `margin` (N,), `paint` (N, PAINT_FIELDS) as in `HandBody`. `sweep` (N, 2): px travelled in x
-    and y during the exposure.
-    """
+    """N `solids` during one frame. `series` (N, PARAMETERS, NODES): their parameters in the camera's frame. `sweep`
+    (N, 2): px travelled in x and y during the exposure."""
 
     series: Array
-    meta: Indices
-    size: Array
-    rgb: Array
-    margin: Array
-    paint: Array
+    solids: Solids
     sweep: Array
 
 
@@ -149,7 +141,7 @@ def trace(moving: Moving, view: View, canvas: Canvas, seed: int) -> tuple[int, i
     top, bottom = _trace_centres(moving, view, canvas)
     if top >= bottom:
         return 0, 0, 0, 0
-    mark_edges(canvas.ids, canvas.edges, canvas.rows, top, bottom, reach_by_id(moving.meta, moving.sweep))
+    mark_edges(canvas.ids, canvas.edges, canvas.rows, top, bottom, reach_by_id(moving.solids.what, moving.sweep))
     _trace_edges(moving, view, canvas, top, bottom, seed)
     left, right = canvas.rows[top, 0], canvas.rows[top, 1]
     for y in range(top, bottom):
@@ -158,27 +150,45 @@ def trace(moving: Moving, view: View, canvas: Canvas, seed: int) -> tuple[int, i
     return left, top, right, bottom
 
 
+class Batch(NamedTuple):
+    """SAMPLES rays: directions `ray` (SAMPLES, 2) and moments `slot` (SAMPLES,), what each has `met` (SAMPLES, 2) - a
+    solid or -1, and a bit mask of all markers on the ray, hidden or not - and at what `depth` (SAMPLES,) m; `tied`:
+    margins of paint by group, m."""
+
+    ray: Array
+    slot: Indices
+    met: Indices
+    depth: Array
+    tied: Array
+
+
+@njit(cache=True)
+def _empty_batch() -> Batch:
+    return Batch(np.empty((SAMPLES, 2)), np.zeros(SAMPLES, np.int64), np.zeros((SAMPLES, 2), np.int64),
+                 np.zeros(SAMPLES), np.zeros(REST_GROUP + 1))
+
+
 @njit(cache=True, fastmath=True, inline="always")
 def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int]:
     """First pass: one ray per pixel. Returns the range of rows that the hand may touch."""
-    series, meta, size, rgb, margin, paint, sweep = moving
+    series, solids, sweep = moving
+    what, size, rgb, _, paint = solids
     rays, intrinsics, timing, light, shading = view
     background, image, ids, masks, _, scanline_bounds, rows, _, _ = canvas
     height, width = ids.shape
-    row, prepared, up = np.empty(12), np.empty((1, len(meta), PREPARED)), np.zeros((1, len(meta), 3))
-    active, near = np.empty(len(meta), np.int64), np.empty(len(meta), np.int64)
-    ray, slot, met, depth, tied = _ray_batch()
+    count, batch = len(sweep), _empty_batch()
+    ray, _, met, depth, _ = batch
+    row, prepared = np.empty(PARAMETERS), np.empty((1, count, PREPARED))
+    active, near = np.empty(count, np.int64), np.empty(count, np.int64)
     top, bottom = height, 0
     for y in range(height):
         left, right, actives = width, 0, 0
-        for n in range(len(meta)):
-            evaluate(series, n, timing[0] + y * timing[1], _parameters(meta, paint, n), row)
-            x0, x1 = span(meta[n, 0], row, size, sweep, n, intrinsics, y, width)
+        for n in range(count):
+            evaluate(series, n, timing[0] + y * timing[1], row)
+            x0, x1 = span(what[n, KIND], row, size, sweep, n, intrinsics, y, width)
             scanline_bounds[y, n, 0], scanline_bounds[y, n, 1] = x0, x1
             if x0 < x1:
-                prepare(meta[n, 0], row, size, prepared, 0, n)
-                if paint[n, BOUNDS] != PLAIN:
-                    up[0, n, 0], up[0, n, 1], up[0, n, 2] = row[6], row[7], row[8]
+                prepare(what[n, KIND], row, size, prepared, 0, n)
                 active[actives] = n
                 actives += 1
                 left, right = min(left, x0), max(right, x1)
@@ -190,7 +200,7 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
             nears = in_block(active, actives, scanline_bounds, y, start, near)
             for i in range(pixels):
                 ray[i, 0], ray[i, 1] = rays[y + 1, start + i + 1, 0], rays[y + 1, start + i + 1, 1]
-            _cast(pixels, ray, slot, near, nears, prepared, meta, size, margin, paint, up, tied, met, depth)
+            _cast(pixels, batch, near, nears, prepared, solids)
             for i in range(pixels):
                 x, winner = start + i, met[i, 0]
                 masks[y, x] = met[i, 1]
@@ -198,13 +208,9 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
                     for c in range(3):
                         image[c, y, x] = background[c, y, x]
                     continue
-                ids[y, x] = id_of(meta, winner)
-                cosine = lambert(meta[winner, 0], prepared, 0, winner, ray[i, 0], ray[i, 1], depth[i], light)
-                shade = 1.0 - shading * (1.0 - cosine)
-                if paint[winner, UNEVEN] > 0.0:
-                    along, across, above = local_point(meta[winner, 0], prepared, 0, winner, ray[i, 0], ray[i, 1],
-                                                       depth[i], size, up)
-                    shade *= paint_level(paint, winner, along, across, above)
+                ids[y, x] = id_of(what, winner)
+                shade = _shade(what[winner, KIND], prepared, 0, winner, ray[i, 0], ray[i, 1], depth[i], paint, light,
+                               shading)
                 for c in range(3):
                     image[c, y, x] = shade * rgb[winner, c]
     return top, bottom
@@ -213,25 +219,23 @@ def _trace_centres(moving: Moving, view: View, canvas: Canvas) -> tuple[int, int
 @njit(cache=True, fastmath=True, inline="always")
 def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: int, seed: int) -> None:
     """Second pass: the marked pixels again, by 16 rays over area and exposure; and the markers' areas."""
-    series, meta, size, rgb, margin, paint, sweep = moving
-    rays, _, timing, light, shading = view
-    background, image, ids, masks, edges, scanline_bounds, rows, visible, whole = canvas
-    slots = SAMPLES if np.max(sweep) > STILL_PX else 1
-    row, prepared, up = np.empty(12), np.empty((slots, len(meta), PREPARED)), np.zeros((slots, len(meta), 3))
-    active, near = np.empty(len(meta), np.int64), np.empty(len(meta), np.int64)
-    ray, slot, met, depth, tied = _ray_batch()
+    series, solids, sweep = moving
+    what, size, _, _, _ = solids
+    rays, _, timing, _, _ = view
+    _, _, ids, masks, edges, scanline_bounds, rows, visible, whole = canvas
+    slots, count = SAMPLES if np.max(sweep) > STILL_PX else 1, len(sweep)
+    row, prepared, batch = np.empty(PARAMETERS), np.empty((slots, count, PREPARED)), _empty_batch()
+    active, near = np.empty(count, np.int64), np.empty(count, np.int64)
     for y in range(top, bottom):
         actives, nears, block = 0, 0, -1
-        for n in range(len(meta)):
+        for n in range(count):
             if scanline_bounds[y, n, 0] < scanline_bounds[y, n, 1]:
                 active[actives] = n
                 actives += 1
                 for k in range(slots):
                     offset = ((k + 0.5) / slots - 0.5) * timing[2]
-                    evaluate(series, n, timing[0] + y * timing[1] + offset, _parameters(meta, paint, n), row)
-                    prepare(meta[n, 0], row, size, prepared, k, n)
-                    if paint[n, BOUNDS] != PLAIN:
-                        up[k, n, 0], up[k, n, 1], up[k, n, 2] = row[6], row[7], row[8]
+                    evaluate(series, n, timing[0] + y * timing[1] + offset, row)
+                    prepare(what[n, KIND], row, size, prepared, k, n)
         for x in range(rows[y, 0], rows[y, 1]):
             if not edges[y, x]:
                 if ids[y, x] >= PAINT_ID:
@@ -242,48 +246,34 @@ def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: i
             if x // SAMPLES != block:
                 block = x // SAMPLES
                 nears = in_block(active, actives, scanline_bounds, y, block * SAMPLES, near)
-            scatter(x, y, slots, seed, rays, ray, slot)
-            _cast(int(SAMPLES), ray, slot, near, nears, prepared, meta, size, margin, paint, up, tied, met, depth)
-            _gather(x, y, ray, slot, prepared, meta, size, rgb, paint, up, met, depth, light, shading, background,
-                    image, visible, whole)
-
-
-@njit(cache=True, inline="always")
-def _parameters(meta: Indices, paint: Array, n: int) -> int:
-    """How many numbers of a solid's row count: all of them where its paint has to know which way is up."""
-    return 12 if paint[n, BOUNDS] != PLAIN else parameters_of(meta[n, 0])
-
-
-@njit(cache=True)
-def _ray_batch() -> tuple[Array, Indices, Indices, Array, Array]:
-    """Room for SAMPLES rays: directions, moments, what they meet, at what depth; and the margins of paint by group."""
-    return (np.empty((SAMPLES, 2)), np.zeros(SAMPLES, np.int64), np.zeros((SAMPLES, 2), np.int64), np.zeros(SAMPLES),
-            np.zeros(REST_GROUP + 1))
+            scatter(x, y, slots, seed, rays, batch.ray, batch.slot)
+            _cast(int(SAMPLES), batch, near, nears, prepared, solids)
+            _gather(x, y, batch, prepared, solids, view, canvas)
 
 
 @njit(cache=True, fastmath=True)
-def _cast(rays: int, ray: Array, slot: Indices, near: Indices, nears: int, prepared: Array, meta: Indices,
-          size: Array, margin: Array, paint: Array, up: Array, tied: Array, met: Indices, depth: Array) -> None:
-    """What each of the first `rays` rays (x, y) meets: `met` (solid or -1, bit mask of all markers on the ray, hidden
-    or not) and the depth. Many rays in one call, because every call counts references of all its arrays.
-    """
+def _cast(rays: int, batch: Batch, near: Indices, nears: int, prepared: Array, solids: Solids) -> None:
+    """What each of the first `rays` rays meets of the first `nears` solids of `near`. Many rays in one call, because
+    every call counts references of all its arrays."""
+    ray, slot, met, depth, tied = batch
+    what, _, _, margin, paint = solids
     for i in range(rays):
         winner, mask, nearest = -1, 0, NO_HIT
         for k in range(nears):
             n = near[k]
-            t = hit(meta[n, 0], prepared, slot[i], n, ray[i, 0], ray[i, 1])
+            t = hit(what[n, KIND], prepared, slot[i], n, ray[i, 0], ray[i, 1])
             if t == NO_HIT:
                 continue
             if paint[n, BOUNDS] != PLAIN:
-                along, across, above = local_point(meta[n, 0], prepared, slot[i], n, ray[i, 0], ray[i, 1], t, size, up)
+                along, across, above = local_point(what[n, KIND], prepared, slot[i], n, ray[i, 0], ray[i, 1], t)
                 if not is_painted(paint, n, along, across, above):
                     continue
             rank = t
-            if meta[n, 2] >= 0:  # markers come first among the solids
-                mask |= 1 << meta[n, 2]
-                tied[meta[n, 1]] = margin[n]
+            if what[n, MARKER] >= 0:  # markers come first among the solids
+                mask |= 1 << what[n, MARKER]
+                tied[what[n, GROUP]] = margin[n]
             elif mask:
-                rank += tied[meta[n, 1]]
+                rank += tied[what[n, GROUP]]
             if rank < nearest:
                 winner, nearest = n, rank
                 depth[i] = t
@@ -293,32 +283,40 @@ def _cast(rays: int, ray: Array, slot: Indices, near: Indices, nears: int, prepa
                 tied[part] = 0.0
 
 
+@njit(cache=True, fastmath=True, inline="always")
+def _shade(kind: int, prepared: Array, slot: int, n: int, x: float, y: float, t: float, paint: Array,
+           light: Array, shading: float) -> float:
+    """How bright solid `n` is at depth `t` on the ray (x, y, 1): 1 where it faces the lamp and its paint is even."""
+    shade = 1.0 - shading * (1.0 - lambert(kind, prepared, slot, n, x, y, t, light))
+    if paint[n, UNEVEN] > 0.0:
+        along, across, above = local_point(kind, prepared, slot, n, x, y, t)
+        shade *= paint_level(paint, n, along, across, above)
+    return shade
+
+
 @njit(cache=True, fastmath=True)
-def _gather(x: int, y: int, ray: Array, slot: Indices, prepared: Array, meta: Indices, size: Array, rgb: Array,
-            paint: Array, up: Array, met: Indices, depth: Array, light: Array, shading: float, background: Image,
-            image: Image, visible: Array, whole: Array) -> None:
+def _gather(x: int, y: int, batch: Batch, prepared: Array, solids: Solids, view: View, canvas: Canvas) -> None:
     """The mean colour of the pixel's 16 rays, and its share in the markers' areas."""
+    ray, slot, met, depth, _ = batch
+    what, _, rgb, _, paint = solids
+    _, _, _, light, shading = view
+    background, image, _, _, _, _, _, visible, whole = canvas
     red, green, blue = 0.0, 0.0, 0.0
     for k in range(SAMPLES):
-        winner, mask = met[k, 0], met[k, 1]
+        n, mask = met[k, 0], met[k, 1]
         if mask:
             _count(mask, 1.0 / SAMPLES, whole)
-        if winner < 0:
+        if n < 0:
             red += background[0, y, x]
             green += background[1, y, x]
             blue += background[2, y, x]
             continue
-        if meta[winner, 2] >= 0:
-            visible[meta[winner, 2]] += 1.0 / SAMPLES
-        cosine = lambert(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1], depth[k], light)
-        shade = 1.0 - shading * (1.0 - cosine)
-        if paint[winner, UNEVEN] > 0.0:
-            along, across, above = local_point(meta[winner, 0], prepared, slot[k], winner, ray[k, 0], ray[k, 1],
-                                               depth[k], size, up)
-            shade *= paint_level(paint, winner, along, across, above)
-        red += shade * rgb[winner, 0]
-        green += shade * rgb[winner, 1]
-        blue += shade * rgb[winner, 2]
+        if what[n, MARKER] >= 0:
+            visible[what[n, MARKER]] += 1.0 / SAMPLES
+        shade = _shade(what[n, KIND], prepared, slot[k], n, ray[k, 0], ray[k, 1], depth[k], paint, light, shading)
+        red += shade * rgb[n, 0]
+        green += shade * rgb[n, 1]
+        blue += shade * rgb[n, 2]
     image[0, y, x] = red / SAMPLES
     image[1, y, x] = green / SAMPLES
     image[2, y, x] = blue / SAMPLES

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhot_app.simulator.render.body import CAPSULE, PAINT_FIELDS, PALM_GROUP, PARAMETERS, POINT_M, SKIN
+from rhot_app.simulator.render.body import CAPSULE, PAINT_FIELDS, PALM_GROUP, PARAMETERS, POINT_M, SKIN, Solids
 from rhot_node.markers import MarkerSet
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 STICK_RGB = (70.0, 68.0, 66.0)
 BALL_RADIUS_M = 0.012
@@ -21,32 +21,14 @@ _STICK_RADIUS_M, _STICK_M = 0.003, 0.4
 
 @dataclass(frozen=True, slots=True)
 class RigidTarget:
-    """N capsules, painted ones first, fixed in the prop's frame; a `Solids`. Fields as of `body.HandBody`.
+    """N capsules fixed in the prop's frame.
 
     `ends` (N, 2, 3) m in the prop's frame; `centres` (M, 3) m of the set's markers, NaN for those it does not wear.
     """
 
-    group: Indices
-    marker: Indices
-    size: Array
-    rgb: Array
+    solids: Solids
     ends: Array
     centres: Array
-
-    @property
-    def kind(self) -> Indices:
-        """(N,) all capsules."""
-        return np.full(len(self.group), CAPSULE, dtype=np.int64)
-
-    @property
-    def margin(self) -> Array:
-        """(N,) m: nothing hides its own paint."""
-        return np.zeros(len(self.group))
-
-    @property
-    def paint(self) -> Array:
-        """(N, PAINT_FIELDS): all of every surface."""
-        return np.zeros((len(self.group), PAINT_FIELDS))
 
     @property
     def marker_count(self) -> int:
@@ -55,7 +37,7 @@ class RigidTarget:
 
     def place(self, world_from_prop: Array, _angles: Array) -> Array:
         """(T, N, 12) parameters of the solids in the world for poses (T, 4, 4)."""
-        out = np.zeros((len(world_from_prop), len(self.group), PARAMETERS))
+        out = np.zeros((len(world_from_prop), len(self.ends), PARAMETERS))
         ends = np.einsum("tij,nkj->tnki", world_from_prop[:, :3, :3], self.ends) + world_from_prop[:, None, None, :3, 3]
         out[:, :, :6] = ends.reshape(len(world_from_prop), -1, 6)
         return out
@@ -66,6 +48,16 @@ class RigidTarget:
                           + world_from_prop[:, None, :3, 3])
 
 
+def capsules(groups: Sequence[int], markers: Sequence[int], radii_m: Sequence[float],
+             colours: Sequence[tuple[float, float, float]]) -> Solids:
+    """Capsules whose whole surface is painted, painted ones first; nothing hides its own paint."""
+    count = len(groups)
+    size = np.zeros((count, 3))
+    size[:, 0] = radii_m
+    what = np.array([(CAPSULE, *one) for one in zip(groups, markers, strict=True)], np.int64)
+    return Solids(what, size, np.array(colours, np.float64), np.zeros(count), np.zeros((count, PAINT_FIELDS)))
+
+
 def ball_on_stick(markers: MarkerSet, index: int) -> RigidTarget:
     """A ball in the colour of one marker at the prop's origin; the stick comes from below and touches it."""
     top = np.array([0.0, BALL_RADIUS_M + _STICK_RADIUS_M, 0.0])
@@ -73,9 +65,8 @@ def ball_on_stick(markers: MarkerSet, index: int) -> RigidTarget:
     centres = np.full((len(markers.markers), 3), np.nan)
     centres[index] = 0.0
     return RigidTarget(
-        group=np.array([0, PALM_GROUP], dtype=np.int64), marker=np.array([index, SKIN], dtype=np.int64),
-        size=np.array([[BALL_RADIUS_M, 0.0, 0.0], [_STICK_RADIUS_M, 0.0, 0.0]]),
-        rgb=np.array([markers.markers[index].display_rgb, STICK_RGB], dtype=np.float64),
+        capsules((0, PALM_GROUP), (index, SKIN), (BALL_RADIUS_M, _STICK_RADIUS_M),
+                 (markers.markers[index].display_rgb, STICK_RGB)),
         ends=np.array([[np.zeros(3), [0.0, POINT_M, 0.0]], [top, top + down]]), centres=centres)
 
 
