@@ -43,7 +43,7 @@ from shipped_rig import RIGHT_HAND  # noqa: E402
 
 from rhot_app.barehand.start import start_pose_file  # noqa: E402
 from rhot_app.barehand.surface import capsules_of, ray_to_capsule, surface_of  # noqa: E402
-from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
+from rhot_app.evaluation.contour_tracker import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.model import HandModel, build_model  # noqa: E402

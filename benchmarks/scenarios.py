@@ -17,10 +17,9 @@ from scipy.optimize import minimize_scalar
 
 from rhot_app.errors import SimulatorError
 from rhot_app.evaluation.accuracy import Deviations, Figures, WornMarkers, axes_within, deviations, distances, worn_by
-from rhot_app.evaluation.compare import cell
 from rhot_app.evaluation.data_sets import DataSet
 from rhot_app.evaluation.run import SETTLE_S
-from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
+from rhot_app.evaluation.score import VISIBLE_FRACTION, cell, count_swaps, rms
 from rhot_app.evaluation.track import Timed, TrackedStates, states_of, tracked
 from rhot_app.hand.skeleton import WRIST_ROLE
 from rhot_app.project import Rig

@@ -39,7 +39,7 @@ from pictures import picture_of, taken, two_cameras, wall  # noqa: E402
 from shipped_rig import LEFT_HAND  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
-from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
+from rhot_app.evaluation.contour_tracker import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402
 from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.project import Rig  # noqa: E402

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 
@@ -18,6 +18,7 @@ from rhot_app.certificate.recordings import (
     StaticStep,
     write_protocol,
 )
+from rhot_app.engine.client import EngineClient
 from rhot_app.errors import CertificateError
 from rhot_app.project import Rig
 
@@ -25,15 +26,7 @@ SECONDS: dict[str, float] = {"static": 10.0, "ruler": 2.0, "rod": 20.0, "flash":
 """How long each step is recorded; with the reading of a ruler about five minutes."""
 
 
-class Asker(Protocol):
-    """Who gives the engine commands; `rhot_app.engine.client.EngineClient` is one."""
-
-    def command(self, name: str, **arguments: Any) -> dict[str, Any]:
-        """Give a command and wait for its answer; raises EngineError."""
-        ...
-
-
-def collect(folder: Path, rig: Rig, engine: Asker, ask: Callable[[str], str],
+def collect(folder: Path, rig: Rig, engine: EngineClient, ask: Callable[[str], str],
             wait: Callable[[float], None] = time.sleep, say: Callable[[str], None] = print) -> ProtocolFile:
     """Lead through the steps; each may be left out by an answer that begins with "s". Logs and ``protocol.json`` stand
     in `folder` afterwards. The patch on the screen needs the app, and is not done here.

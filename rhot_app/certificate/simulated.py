@@ -27,9 +27,8 @@ from rhot_app.certificate.recordings import (
 )
 from rhot_app.progress import Progress, silent
 from rhot_app.project import Rig
-from rhot_app.simulator.film.detected import Sending, detected
 from rhot_app.simulator.film.film import for_each_camera
-from rhot_app.simulator.film.node_log import T0_MASTER_NS, write_node_log
+from rhot_app.simulator.film.node_log import T0_MASTER_NS, Sending, detected, write_node_log
 from rhot_app.simulator.film.points import PointNoise, PointStream
 from rhot_app.simulator.film.scene_objects import SceneObject
 from rhot_app.simulator.film.shot import Shot, make_shot

@@ -47,14 +47,16 @@ class Commands:
 
     def __init__(self, engine: Engine, *, quit_: Callable[[], None], preview: Callable[[bool], None]) -> None:
         self._engine = engine
-        self._quit = quit_
         self._preview = preview
-        self._table: dict[str, Callable[[Arguments], Answer]] = {
-            "hello": self._hello, "status": self._status, "start": self._start, "stop": self._stop,
-            "record": self._record, "record_stop": self._record_stop, "bookmark": self._bookmark, "rig": self._rig,
-            "set_rig": self._set_rig, "save_rig": self._save_rig, "preview": self._set_preview,
-            "refined": self._refined, "adapted": self._adapted, "measured": self._measured,
-            "quit": self._end,
+        self._table: dict[str, Callable[[Arguments], Answer | None]] = {
+            "hello": lambda _: self._hello(), "rig": lambda _: self._rig(),
+            "status": lambda _: {"status": msgspec.to_builtins(engine.status())},
+            "start": lambda _: {"session": engine.start()}, "stop": lambda _: engine.stop(),
+            "record": self._record, "record_stop": lambda _: {"path": str(engine.record_stop() or "")},
+            "bookmark": self._bookmark, "set_rig": self._set_rig,
+            "save_rig": lambda arguments: {"path": str(engine.save_rig(_path(arguments)))},
+            "preview": self._set_preview, "refined": lambda _: engine.refined(), "adapted": lambda _: engine.adapted(),
+            "measured": lambda _: engine.measured(), "quit": lambda _: quit_(),
         }
 
     @property
@@ -69,7 +71,7 @@ class Commands:
             return refusal(EngineError(f"there is no command {name!r}; there are {', '.join(sorted(self._table))}, "
                                        "node and still.")), None
         try:
-            done = action(arguments)
+            done = action(arguments) or {}
         except (RhotError, NodeError) as exc:
             return refusal(exc), None
         except Exception as exc:  # a command must never end the engine; the log has the whole story
@@ -78,20 +80,10 @@ class Commands:
         attached = done.pop(done["attachment"]) if "attachment" in done else None
         return {"ok": True, **done}, attached
 
-    def _hello(self, arguments: Arguments) -> Answer:
+    def _hello(self) -> Answer:
         engine = self._engine
         return {"program": "rhot", "version": version("rhot"), "pid": os.getpid(), "running": engine.running,
                 "rig_name": engine.rig.name, "rig_path": str(engine.rig_path or "")}
-
-    def _status(self, arguments: Arguments) -> Answer:
-        return {"status": msgspec.to_builtins(self._engine.status())}
-
-    def _start(self, arguments: Arguments) -> Answer:
-        return {"session": self._engine.start()}
-
-    def _stop(self, arguments: Arguments) -> Answer:
-        self._engine.stop()
-        return {}
 
     def _record(self, arguments: Arguments) -> Answer:
         path = _path(arguments)
@@ -103,56 +95,29 @@ class Commands:
         self._engine.record(path, video=video)
         return {"path": str(path)}
 
-    def _record_stop(self, arguments: Arguments) -> Answer:
-        path = self._engine.record_stop()
-        return {"path": "" if path is None else str(path)}
-
     def _bookmark(self, arguments: Arguments) -> Answer:
         text = arguments.get("text")
         if not isinstance(text, str) or not text:
             raise EngineError('bookmark needs a "text": one line about this moment.')
-        t_ns = _time_ns(arguments, "bookmark") if "t_master_ns" in arguments else None
+        t_ns = arguments.get("t_master_ns")
+        if "t_master_ns" in arguments and (type(t_ns) is not int or not 0 <= t_ns < 1 << 63):
+            raise EngineError('bookmark needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
         return {"t_master_ns": self._engine.bookmark(text, t_ns)}
 
-    def _rig(self, arguments: Arguments) -> Answer:
+    def _rig(self) -> Answer:
         return {"document": msgspec.to_builtins(self._engine.rig), "path": str(self._engine.rig_path or "")}
 
-    def _set_rig(self, arguments: Arguments) -> Answer:
+    def _set_rig(self, arguments: Arguments) -> None:
         document = arguments.get("document")
         if not isinstance(document, dict):
             raise EngineError('set_rig needs a "document": the whole rig as an object.')
         self._engine.set_rig(parse_rig(msgspec.json.encode(document), "the new rig"))
-        return {}
 
-    def _save_rig(self, arguments: Arguments) -> Answer:
-        return {"path": str(self._engine.save_rig(_path(arguments)))}
-
-    def _refined(self, arguments: Arguments) -> Answer:
-        return self._engine.refined()
-
-    def _adapted(self, arguments: Arguments) -> Answer:
-        return self._engine.adapted()
-
-    def _measured(self, arguments: Arguments) -> Answer:
-        return self._engine.measured()
-
-    def _set_preview(self, arguments: Arguments) -> Answer:
+    def _set_preview(self, arguments: Arguments) -> None:
         on = arguments.get("on")
         if not isinstance(on, bool):
             raise EngineError('preview needs "on": true or false.')
         self._preview(on)
-        return {}
-
-    def _end(self, arguments: Arguments) -> Answer:
-        self._quit()
-        return {}
-
-
-def _time_ns(arguments: Arguments, command: str) -> int:
-    t_ns = arguments.get("t_master_ns")
-    if not isinstance(t_ns, int) or isinstance(t_ns, bool) or not 0 <= t_ns < 1 << 63:
-        raise EngineError(f'{command} needs "t_master_ns": a time of the master\'s monotonic clock, in nanoseconds.')
-    return t_ns
 
 
 def _path(arguments: Arguments) -> Path | None:

@@ -19,6 +19,7 @@ from rhot_app.barehand.key_frames import KeyFrame
 from rhot_app.calibration.hand.bones_report import BonesReport
 from rhot_app.calibration.hand.landmark_bones import measure_bones, spreads_apart
 from rhot_app.calibration.hand.marker_places import tracks_of
+from rhot_app.calibration.verdict import Verdict
 from rhot_app.engine.status import Advice, advise
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy
@@ -108,8 +109,8 @@ class RigWatch:
         if found is None:
             return {"known": False}
         verdict = verdict_of(found, self._rig.nodes[0].name)
-        return {"known": True, "stale": not found.holds, "usable": usable(found), **verdict.to_json(),
-                "rows": figure_rows(found), "document": msgspec.to_builtins(refined_rig(rig, found))}
+        return {"stale": not found.holds, "usable": usable(found),
+                **_proposal(verdict, figure_rows(found), refined_rig(rig, found))}
 
     def _judge(self, gathered: Gathered, run: int) -> None:
         found = self._refiner.refine(gathered)
@@ -157,8 +158,8 @@ class HandWatch:
         found = self._newest
         if found is None:
             return {"known": False}
-        return {"known": True, **found.verdict.to_json(), "rows": _hand_rows(self._rig.hand, found.hand),
-                "document": msgspec.to_builtins(msgspec.structs.replace(self._rig, hand=found.hand))}
+        return _proposal(found.verdict, _hand_rows(self._rig.hand, found.hand),
+                         msgspec.structs.replace(self._rig, hand=found.hand))
 
     def _solve(self, kept: list[KeyFrame], run: int) -> None:
         try:
@@ -229,8 +230,13 @@ class BonesWatch:
         self._shown, self._offer = found.hand, None
         hand = msgspec.structs.replace(found.hand, name="measured from landmarks")
         size = ("size", "100 %", f"{100.0 * found.size:.1f} ± {100.0 * found.size_std:.1f} %")
-        return {"known": True, **found.verdict.to_json(), "rows": [size, *_hand_rows(self._rig.hand, hand)],
-                "document": msgspec.to_builtins(msgspec.structs.replace(self._rig, hand=hand))}
+        return _proposal(found.verdict, [size, *_hand_rows(self._rig.hand, hand)],
+                         msgspec.structs.replace(self._rig, hand=hand))
+
+
+def _proposal(verdict: Verdict, rows: list[Any], rig: Rig) -> dict[str, Any]:
+    """The answer with a rig to use: the verdict's fields, `rows` of (what, before, after), the rig's `document`."""
+    return {"known": True, **verdict.to_json(), "rows": rows, "document": msgspec.to_builtins(rig)}
 
 
 def _apart_mm(report: BonesReport, hand: HandAnatomy) -> float:

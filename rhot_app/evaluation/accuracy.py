@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from rhot_app.evaluation.score import VISIBLE_FRACTION, count_swaps, rms
+from rhot_app.evaluation.score import DEGREE, VISIBLE_FRACTION, count_swaps, rms, scaled
 from rhot_app.evaluation.track import DISPLAY_HZ, TrackedStates
 from rhot_app.hand.skeleton import ANGLE_SLICES, FINGERS, TIP_ROLES
 from rhot_app.project import Rig
@@ -225,15 +225,15 @@ def accuracy(track: TrackedStates, off: Deviations, truth: Truth, worn: WornMark
     within, judged = axes_within(ahead, stated, np.ones(ahead.shape[:2], np.bool_))
     span_s = float(track.times_s[-1] - track.times_s[0])
     return {
-        "tip_visible_mm": _scaled(rms(tips[off.visible[:, worn.tips]]), 1e3),
-        "tip_measured_mm": _scaled(rms(tips[off.measured[:, worn.tips]]), 1e3),
-        "tip_all_mm": _scaled(rms(tips), 1e3),
-        "tip_display_mm": _scaled(rms(display_error(track, truth, worn)), 1e3),
-        "tip_predicted_mm": _scaled(rms(distances(ahead)), 1e3),
+        "tip_visible_mm": scaled(rms(tips[off.visible[:, worn.tips]]), 1e3),
+        "tip_measured_mm": scaled(rms(tips[off.measured[:, worn.tips]]), 1e3),
+        "tip_all_mm": scaled(rms(tips), 1e3),
+        "tip_display_mm": scaled(rms(display_error(track, truth, worn)), 1e3),
+        "tip_predicted_mm": scaled(rms(distances(ahead)), 1e3),
         "predicted_3_sd_share": within / judged if judged else None,
-        "marker_mm": _scaled(rms(distances(off.markers)[off.visible]), 1e3),
-        "angles_deg": _scaled(rms(off.angles[:, worn.angles]), float(np.degrees(1.0))),
-        "palm_turn_deg": _scaled(rms(distances(off.palm[:, 3:])), float(np.degrees(1.0))),
+        "marker_mm": scaled(rms(distances(off.markers)[off.visible]), 1e3),
+        "angles_deg": scaled(rms(off.angles[:, worn.angles]), DEGREE),
+        "palm_turn_deg": scaled(rms(distances(off.palm[:, 3:])), DEGREE),
         "swaps": float(count_swaps(track.marker_positions, truth.markers_at(track.times_s))),
         "measured_share": float(off.measured[off.visible].mean()) if off.visible.any() else None,
         "states_per_s": (len(track.times_s) - 1) / span_s if span_s > 0.0 else None,
@@ -278,7 +278,3 @@ def _pool(name: str, values: Sequence[float | None]) -> float | None:
     if name in _ADDED:
         return float(known.sum())
     return float(known.mean()) if name in _PLAIN else rms(known)
-
-
-def _scaled(value: float | None, factor: float) -> float | None:
-    return None if value is None else factor * value

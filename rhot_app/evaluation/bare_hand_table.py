@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from rhot_app.evaluation.bare_hand import Case, EvaluatedRun, Figures, figures_of
-from rhot_app.evaluation.compare import cell
+from rhot_app.evaluation.score import cell
 
 
 @dataclass(frozen=True, slots=True)

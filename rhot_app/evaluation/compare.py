@@ -23,6 +23,7 @@ from rhot_app.evaluation.accuracy import (
 )
 from rhot_app.evaluation.data_sets import DataSet, Order, Watch, data_set
 from rhot_app.evaluation.run import SETTLE_S
+from rhot_app.evaluation.score import cell
 from rhot_app.evaluation.track import rig_with, tracked
 from rhot_app.progress import Progress, silent
 from rhot_app.project import TrackerSettings
@@ -230,11 +231,6 @@ def baseline_table(comparison: Comparison, baseline: Baseline) -> str:
 def _span(seeds: int, degrees: int) -> str:
     low, high = band(seeds, degrees)
     return f"{low:.2f}-{high:.2f}"
-
-
-def cell(value: float | None, form: str) -> str:
-    """A figure, or a dash where there is none."""
-    return "-" if value is None or value != value else format(value, form)
 
 
 def _name(run: Run) -> str:

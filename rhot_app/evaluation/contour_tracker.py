@@ -1,5 +1,8 @@
 """The contour trackers as a user runs them, offline and live: they learn the background of the first pictures, then
-wait for a hand that takes the start pose."""
+wait for a hand that takes the start pose.
+
+`SearchedNodes` search pictures for a tracker, as `rhot_node.slice_search` does, without sockets and processes.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +15,86 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.errors import TrackingError
-from rhot_app.evaluation.searched_nodes import FIRST_NS, SearchedNodes
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings
 from rhot_app.state import HandState
 from rhot_app.tracking.contours.follower import HandFollower
 from rhot_app.tracking.scene import make_tracker
-from rhot_node.detect.foreground import Foreground, learn_background, skin_foreground
+from rhot_app.tracking.tracker import CameraFrame, CameraObservations, Tracker, may_be_due
+from rhot_node.detect.edges import find_edges, noise_of
+from rhot_node.detect.foreground import Foreground, foreground_map, learn_background, skin_foreground
+from rhot_node.wire.messages import MarkerFlag
 
+Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
+
+PERIOD_NS: Final = 33_333_333
+FIRST_NS: Final = 10**9
+
+AGE_NS: Final = 9_000_000
+"""ns from a frame's exposure to its arrival: what a node without load needs for detection and network."""
+
+
+class SearchedNodes:
+    """Hands the frames of some cameras to a tracker, and does what it asks for. Searches beside the frames are waited
+    for, so that a run can be repeated; `states` are those that came of it."""
+
+    def __init__(self, tracker: Tracker, foreground: Sequence[Foreground], markers: int, *,
+                 forget: bool = False, rounded_ns: int = 0) -> None:
+        """`foreground`: what each camera has learnt. `markers`: of the rig's set. `forget`: requests are given back as
+        a log has them. `rounded_ns`: by which the times of edges and maps differ from those of the markers."""
+        tracker.warm_up()
+        self.tracker, self.foreground, self.markers, self.forget = tracker, list(foreground), markers, forget
+        self.rounded_ns = rounded_ns
+        self.asked: list[SliceRequest | None] = [None] * len(foreground)
+        self.states: list[HandState] = []
+
+    def step(self, number: int, images: Sequence[Picture | None], pixels: Sequence[Array] | None = None,
+             seen: Sequence[CameraObservations] | None = None, times_ns: Sequence[int] | None = None) -> None:
+        """Frame `number` of each camera, RGB, None of one that gives none; `pixels` (M, 2) of its markers, or all that
+        is `seen` of them at another time. `times_ns`: the frames' own, of all rows at once; PERIOD_NS apart by
+        default."""
+        for camera, image in enumerate(images):
+            t_ns = FIRST_NS + number * PERIOD_NS if times_ns is None else times_ns[camera]
+            if image is None:
+                continue
+            request, known = self.asked[camera], self.foreground[camera]
+            if seen is not None:
+                self.give(replace(seen[camera], t_row0_master_ns=t_ns, t_receive_ns=t_ns + AGE_NS))
+            else:
+                self.give(observations_at(camera, t_ns, np.full((self.markers, 2), np.nan) if pixels is None
+                                          else pixels[camera]))
+            if request is None:
+                continue
+            searched_ns = t_ns + self.rounded_ns
+            if len(request.slices):
+                found = find_edges(image, request.slices, known, noise_of(image))
+                answered = replace(request, expected=None) if self.forget else request
+                self.give(EdgeFrame(camera, searched_ns, 0, t_ns + AGE_NS, 0.004, 0.001, answered, found))
+            if request.map_step:
+                self.give(ForegroundFrame(camera, searched_ns, 0, t_ns + AGE_NS, request.map_step,
+                                          foreground_map(image, known, request.map_step)))
+
+    def give(self, frame: CameraFrame) -> None:
+        """Hand one frame to the tracker, keep its state if one is due, and note what it asks for."""
+        self.tracker.ingest(frame)
+        self.tracker.wait()
+        state = self.tracker.solve() if may_be_due(frame) else None
+        if state is not None:
+            self.states.append(state)
+        for request in self.tracker.requests():
+            self.asked[request.camera] = request
+
+
+def observations_at(camera: int, t_ns: int, pixels: Array) -> CameraObservations:
+    """Markers at `pixels` (M, 2), NaN for lost."""
+    count = len(pixels)
+    return CameraObservations(
+        camera, t_ns, 0, 1e-4, t_ns + AGE_NS, 0.004, 0.001, pixels, np.tile(0.01 * np.eye(2), (count, 1, 1)),
+        np.full(count, 12.0), np.ones(count), np.where(np.isnan(pixels[:, 0]), MarkerFlag.LOST, 0).astype(np.uint16))
+
 
 BACKGROUND_PICTURES: Final = 8
 """Pictures of each camera, without a hand, from which its background is learnt: a quarter of a second at 30 Hz, in

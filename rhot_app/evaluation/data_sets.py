@@ -21,10 +21,9 @@ import msgspec
 
 from rhot_app.project import Rig, load_rig
 from rhot_app.recording.raw_log import LogReader, Record
-from rhot_app.simulator.film.detected import Sending, detected
 from rhot_app.simulator.film.film import TRUTH_NAME, Progress, for_each_camera, new_folder
 from rhot_app.simulator.film.ideal_observations import ORDINARY, ideal_observations
-from rhot_app.simulator.film.node_log import CABLE, Network, write_node_log
+from rhot_app.simulator.film.node_log import CABLE, Network, Sending, detected, write_node_log
 from rhot_app.simulator.film.shot import RIG_NAME, make_shot, save_shot
 from rhot_app.simulator.film.truth import Truth, load_truth, save_truth, true_object
 from rhot_app.simulator.scene.scene import Scene

@@ -15,7 +15,7 @@ from rhot_app.engine.client import EngineClient
 from rhot_app.engine.process import ensure_engine, stop_engine
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import EngineError, SimulatorError
-from rhot_app.evaluation.score import TrueSamples, score
+from rhot_app.evaluation.score import TrueSamples, cell, score
 from rhot_app.progress import ProgressLine
 from rhot_app.project import Rig, save_rig
 from rhot_app.simulator.film.film import TRUTH_NAME, film
@@ -113,9 +113,9 @@ SETTLE_S = 1.0
 """What happens before this scene time is not judged."""
 
 COLUMNS = (
-    ("fingertip_rms_mm", "fingertip mm", "{:.2f}"), ("marker_rms_mm", "marker mm", "{:.2f}"),
-    ("wrist_rms_mm", "wrist mm", "{:.2f}"), ("joint_rms_deg", "joints deg", "{:.1f}"),
-    ("measured_fraction", "measured", "{:.3f}"), ("swaps", "swaps", "{:d}"), ("state_rate_hz", "states/s", "{:.1f}"),
+    ("fingertip_rms_mm", "fingertip mm", ".2f"), ("marker_rms_mm", "marker mm", ".2f"),
+    ("wrist_rms_mm", "wrist mm", ".2f"), ("joint_rms_deg", "joints deg", ".1f"),
+    ("measured_fraction", "measured", ".3f"), ("swaps", "swaps", "d"), ("state_rate_hz", "states/s", ".1f"),
 )
 
 
@@ -141,9 +141,9 @@ def table(rows: Sequence[tuple[str, dict[str, Any]]]) -> str:
     heads = [head for _, head, _ in COLUMNS] + ["age p50 ms", "receive-state p99 ms"]
     lines = ["  ".join([" " * width, *heads])]
     for name, figures in rows:
-        cells = [_cell(figures[key], form) for key, _, form in COLUMNS]
-        cells += [_cell(figures["state_age_ms"]["p50"], "{:.1f}"),
-                  _cell(figures["latency_ms"]["receive_to_state"]["p99"], "{:.2f}")]
+        cells = [cell(figures[key], form) for key, _, form in COLUMNS]
+        cells += [cell(figures["state_age_ms"]["p50"], ".1f"),
+                  cell(figures["latency_ms"]["receive_to_state"]["p99"], ".2f")]
         aligned = [cell.rjust(len(head)) for cell, head in zip(cells, heads, strict=True)]
         lines.append("  ".join([name.ljust(width), *aligned]))
     return "\n".join(lines)
@@ -154,15 +154,11 @@ def details(figures: dict[str, Any]) -> str:
     lines = ["marker     error mm  unfiltered jitter mm"]
     for name, error in figures["marker_rms_mm_each"].items():
         jitter = figures["marker_jitter_unfiltered_mm_each"][name]
-        lines.append(f"{name:<10} {_cell(error, '{:.2f}'):>8}  {_cell(jitter, '{:.3f}'):>20}")
+        lines.append(f"{name:<10} {cell(error, '.2f'):>8}  {cell(jitter, '.3f'):>20}")
     lines += ["", "latency            p50 ms    p99 ms"]
     for stage, value in figures["latency_ms"].items():
-        lines.append(f"{stage:<17} {_cell(value['p50'], '{:.3f}'):>7}  {_cell(value['p99'], '{:.3f}'):>8}")
+        lines.append(f"{stage:<17} {cell(value['p50'], '.3f'):>7}  {cell(value['p99'], '.3f'):>8}")
     return "\n".join(lines)
-
-
-def _cell(value: float | None, form: str) -> str:
-    return "-" if value is None else form.format(value)
 
 
 # -- evaluation of a scene ---------------------------------------------------------------------------------------------

@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 SWAP_FRAMES = 3
 """A marker nearer to another's truth than to its own for this many states in a row is a swap."""
 
+DEGREE = float(np.degrees(1.0))
+"""Degrees in a radian."""
+
 VISIBLE_FRACTION = 0.9
 """A marker counts as truly visible to a camera when at least this part of its outline is not hidden."""
 
@@ -63,8 +66,14 @@ def _summary(values: Array) -> dict[str, float | None]:
     return dict(zip(("p50", "p99"), (float(one) if np.isfinite(one) else None for one in p50_p99(values)), strict=True))
 
 
-def _millimetres(value: float | None) -> float | None:
-    return None if value is None else 1e3 * value
+def scaled(value: float | None, factor: float) -> float | None:
+    """In another unit; None stays."""
+    return None if value is None else factor * value
+
+
+def cell(value: float | None, form: str) -> str:
+    """A figure, or a dash where there is none."""
+    return "-" if value is None or value != value else format(value, form)
 
 
 def score(states: Sequence[HandState], truth: TrueSamples, roles: Sequence[str | None]) -> dict[str, Any]:
@@ -91,20 +100,19 @@ def score(states: Sequence[HandState], truth: TrueSamples, roles: Sequence[str |
     span_s = (states[-1].t_master_ns - states[0].t_master_ns) * 1e-9
     return {
         "states": len(states),
-        "fingertip_rms_mm": _millimetres(rms(tip_error)),
-        "fingertip_rms_mm_each": {ids[marker]: _millimetres(rms(tip_error[:, column]))
+        "fingertip_rms_mm": scaled(rms(tip_error), 1e3),
+        "fingertip_rms_mm_each": {ids[marker]: scaled(rms(tip_error[:, column]), 1e3)
                                   for column, (_, marker) in enumerate(tips)},
-        "marker_rms_mm": _millimetres(rms(np.where(measured, error, np.nan))),
-        "marker_rms_mm_each": {name: _millimetres(rms(np.where(measured[:, k], error[:, k], np.nan)))
+        "marker_rms_mm": scaled(rms(np.where(measured, error, np.nan)), 1e3),
+        "marker_rms_mm_each": {name: scaled(rms(np.where(measured[:, k], error[:, k], np.nan)), 1e3)
                                for k, name in enumerate(ids)},
-        "marker_unfiltered_rms_mm": _millimetres(rms(np.where(measured, np.linalg.norm(raw_error, axis=2), np.nan))),
+        "marker_unfiltered_rms_mm": scaled(rms(np.where(measured, np.linalg.norm(raw_error, axis=2), np.nan)), 1e3),
         "marker_jitter_unfiltered_mm_each": {
-            name: _millimetres(scatter(np.where(measured[:, k, None], raw_error[:, k], np.nan)))
+            name: scaled(scatter(np.where(measured[:, k, None], raw_error[:, k], np.nan)), 1e3)
             for k, name in enumerate(ids)},
-        "wrist_rms_mm": _millimetres(rms(np.where(wrist_seen, wrist, np.nan))),
-        "joint_rms_deg": None if (value := rms(angle_error)) is None else float(np.degrees(value)),
-        "joint_rms_deg_each": {name: None if (value := rms(angle_error[:, k])) is None else float(np.degrees(value))
-                               for k, name in enumerate(ANGLES)},
+        "wrist_rms_mm": scaled(rms(np.where(wrist_seen, wrist, np.nan)), 1e3),
+        "joint_rms_deg": scaled(rms(angle_error), DEGREE),
+        "joint_rms_deg_each": {name: scaled(rms(angle_error[:, k]), DEGREE) for k, name in enumerate(ANGLES)},
         "measured_fraction": float(measured[visible].mean()) if visible.any() else None,
         "visible_samples": int(visible.sum()),
         "swaps": count_swaps(positions, truth.markers),

@@ -184,6 +184,11 @@ def joined(parts: Sequence[HandStates]) -> HandStates:
                       for same in zip(*(part.objects for part in parts), strict=True)))
 
 
+def hands_of(states: HandStates) -> dict[str, HandStates]:
+    """The hands by what their names begin with."""
+    return {"": states} if states.other is None else {"": states, OTHER_HAND: states.other}
+
+
 def in_blocks(states: Iterable[HandState], size: int = BLOCK) -> Iterator[HandStates]:
     """States as they come, `size` at a time."""
     waiting: list[HandState] = []

@@ -408,9 +408,8 @@ def _learn_backgrounds(client: EngineClient, deadline: float) -> None:
 
 
 def _measure(args: argparse.Namespace) -> int:
-    from rhot_app.mouse.measure import measures
+    from rhot_app.mouse.measure import measures, report
     from rhot_app.mouse.play import SetUp
-    from rhot_app.mouse.report import report
     from rhot_app.progress import ProgressLine
 
     chosen = SetUp("contours", args.cameras, args.pictures, "back") if args.bare else SetUp(

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.start import start_pose_file
 from rhot_app.estimation.se3 import exp_so3
+from rhot_app.evaluation.contour_tracker import SearchedNodes
 from rhot_app.evaluation.data_sets import Order, Watch, data_set, data_sets_folder
-from rhot_app.evaluation.searched_nodes import SearchedNodes
 from rhot_app.evaluation.track import Timed, states_of
 from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import build_model

@@ -14,7 +14,7 @@ from shipped_rig import LEFT_MODEL, RIGHT_HAND, RIGHT_MODEL
 from rhot_app.barehand.start import start_pose_file
 from rhot_app.barehand.surface import Surface, surface_of
 from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation
-from rhot_app.evaluation.searched_nodes import SearchedNodes
+from rhot_app.evaluation.contour_tracker import SearchedNodes
 from rhot_app.geometry.camera import LENS, CameraModel, rig_intrinsics
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.model import HandModel

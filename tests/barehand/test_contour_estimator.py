@@ -18,7 +18,7 @@ from shipped_rig import RIGHT_MODEL
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.errors import RigError
-from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS
+from rhot_app.evaluation.contour_tracker import FIRST_NS, PERIOD_NS
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import FLEXIONS, JOINTS, HandPose

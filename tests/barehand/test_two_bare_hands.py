@@ -13,7 +13,7 @@ from shipped_rig import LEFT_HAND
 
 from rhot_app.barehand.observations import EdgeFrame, SliceRequest
 from rhot_app.errors import RigError
-from rhot_app.evaluation.searched_nodes import FIRST_NS, PERIOD_NS
+from rhot_app.evaluation.contour_tracker import FIRST_NS, PERIOD_NS
 from rhot_app.hand.kinematics import forward
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig, TrackerSettings, load_rig, save_rig, with_tracker

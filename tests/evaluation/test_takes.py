@@ -18,9 +18,8 @@ from rhot_app.evaluation.data_sets import LOG_NAME, DataSet, Order, data_set
 from rhot_app.evaluation.track import tracked
 from rhot_app.project import TrackerSettings
 from rhot_app.recording.raw_log import LogReader, Record, RecordKind
-from rhot_app.simulator.film.detected import Stream
 from rhot_app.simulator.film.film import TRUTH_NAME, Report
-from rhot_app.simulator.film.node_log import CABLE, Network
+from rhot_app.simulator.film.node_log import CABLE, Network, Stream
 from rhot_app.simulator.film.shot import Shot
 from rhot_app.simulator.scene.scene import Scene, make_scene, twin_defaults
 from rhot_app.sources.replay import LogValidator

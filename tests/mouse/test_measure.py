@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rhot_app.mouse import measure
-from rhot_app.mouse.measure import coupling, latency, one_camera, resolution
-from rhot_app.mouse.report import report
+from rhot_app.mouse.measure import coupling, latency, one_camera, report, resolution
 from rhot_app.mouse.script import Script
 
 

@@ -18,8 +18,7 @@ from rhot_app.errors import OutputError
 from rhot_app.hand.model import neutral_pose
 from rhot_app.outputs import output as output_file
 from rhot_app.outputs.joints import JointConverter, Sample
-from rhot_app.outputs.output import QUEUE, Output
-from rhot_app.outputs.outputs import Outputs
+from rhot_app.outputs.outputs import QUEUE, Output, Outputs
 from rhot_app.project import OutputSettings, Rig
 
 

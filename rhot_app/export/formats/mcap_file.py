@@ -5,7 +5,8 @@ The schemas of the scene and the frames are Foxglove's, by its names of messages
 
 from __future__ import annotations
 
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Any, BinaryIO, Final
 
 import msgspec
 import numpy as np
@@ -14,9 +15,8 @@ from numpy.typing import NDArray
 from rhot_app.errors import require
 from rhot_app.estimation.se3 import quaternion_from_rotation
 from rhot_app.export.plan import Format, Plan
-from rhot_app.export.states import CONDITIONS, OBJECT_ARRAYS, VALIDITIES, HandStates
+from rhot_app.export.states import CONDITIONS, OBJECT_ARRAYS, VALIDITIES, HandStates, hands_of
 from rhot_app.hand.skeleton import FINGERS
-from rhot_app.project import OTHER_HAND
 
 Array = NDArray[np.float64]
 Message = dict[str, Any]
@@ -99,22 +99,38 @@ OF_HAND: Final = tuple(name for name in hand_state(0)["properties"]
 """The arrays that each hand has for itself."""
 
 
-class McapWriter:
-    """Streams messages in compressed chunks; their time is the wall clock's, of logs that say when they were begun."""
+class TimedMessages:
+    """Messages on their way to an MCAP file, by a writer of the library's; their time is the wall clock's, of logs that
+    say when they were begun."""
+
+    def __init__(self, plan: Plan, make_writer: Callable[[BinaryIO], Any]) -> None:
+        self.notes: list[str] = []
+        if plan.wall_clock_offset_ns is None:
+            self.notes.append("the log does not say when it was begun; the file's times are of the master's own clock")
+        self._offset_ns = plan.wall_clock_offset_ns or 0
+        self._frame_id = "rig" if plan.frame == "rig" else "palm"
+        self._file = plan.path.open("wb")
+        self._writer = make_writer(self._file)
+
+    def finish(self) -> None:
+        """Write the index."""
+        self._writer.finish()
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class McapWriter(TimedMessages):
+    """Every state as Foxglove's messages, in JSON."""
 
     def __init__(self, plan: Plan) -> None:
         require("mcap", "an MCAP file")
         from mcap.writer import Writer
 
-        self.notes: list[str] = []
-        if plan.wall_clock_offset_ns is None:
-            self.notes.append("the log does not say when it was begun; the file's times are of the master's own clock")
-        self._plan = plan
-        self._offset_ns = plan.wall_clock_offset_ns or 0
-        self._frame_id = "rig" if plan.frame == "rig" else "palm"
+        super().__init__(plan, Writer)
         self._encode = msgspec.json.Encoder().encode
-        self._file = plan.path.open("wb")
-        self._writer = Writer(self._file)
         self._writer.start(profile="", library="rhot")
         self._writer.add_metadata("rhot", plan.about())
         self._channels = {
@@ -135,7 +151,7 @@ class McapWriter:
 
     def add(self, states: HandStates) -> None:
         """Write the messages of these states."""
-        hands = [("", states)] if states.other is None else [("", states), (OTHER_HAND, states.other)]
+        hands = list(hands_of(states).items())
         turns = [quaternion_from_rotation(hand.world_from_palm[:, :3, :3]).tolist() for _, hand in hands]
         object_turns = [quaternion_from_rotation(one.world_from_object[:, :3, :3]).tolist() for one in states.objects]
         object_tables: list[dict[str, list[Any]]] = [
@@ -169,15 +185,6 @@ class McapWriter:
     def _send(self, topic: str, t_ns: int, message: Message) -> None:
         self._writer.add_message(channel_id=self._channels[topic], log_time=t_ns, publish_time=t_ns,
                                  data=self._encode(message))
-
-    def finish(self) -> None:
-        """Write the index."""
-        self._writer.finish()
-        self._file.flush()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 def _rows(states: HandStates, *, with_markers: bool = False) -> dict[str, list[Any]]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rhot_app.errors import ExportError, require
 from rhot_app.export.frames import Axes, file_from_frame, frame_up
 from rhot_app.export.plan import Format, Plan
-from rhot_app.export.states import HandStates, hidden_where_lost
+from rhot_app.export.states import HandStates, hands_of, hidden_where_lost
 from rhot_app.hand.skeleton import ANGLES, FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND
 from rhot_node.errors import printable
@@ -29,7 +29,7 @@ Compact = NDArray[np.float32]
 def labels(states: HandStates) -> tuple[str, ...]:
     """Names of the points, in the order of `points_of`: joints, fingertips and markers."""
     found: list[str] = []
-    for prefix in _hands(states):
+    for prefix in hands_of(states):
         found += [f"{prefix}{joint}" for joint in JOINTS]
         found += [f"{prefix}{finger}_fingertip" for finger in FINGERS]
     return (*found, *(f"marker_{marker}" for marker in states.marker_ids))
@@ -40,17 +40,13 @@ def points_of(states: HandStates) -> tuple[Array, Array]:
     of the mean variance of its axes, NaN where it is not estimated."""
     positions: list[Array] = []
     covariances: list[Array] = []
-    for hand in _hands(states).values():
+    for hand in hands_of(states).values():
         positions += [hidden_where_lost(hand.joint_positions, hand), hidden_where_lost(hand.fingertip_positions, hand)]
         covariances += [hand.joint_covariances, hand.fingertip_covariances]
     positions.append(states.marker_positions)
     covariances.append(states.marker_covariances)
     variances = np.trace(np.concatenate(covariances, axis=1), axis1=2, axis2=3) / 3.0
     return np.concatenate(positions, axis=1), np.sqrt(variances)
-
-
-def _hands(states: HandStates) -> dict[str, HandStates]:
-    return {"": states} if states.other is None else {"": states, OTHER_HAND: states.other}
 
 
 class _Points:
@@ -72,7 +68,7 @@ class _Points:
         self._positions.append((positions @ self._turn.T).astype(np.float32))
         self._deviations.append((self._plan.scale * deviations).astype(np.float32))
         self._angles.append(np.degrees(np.concatenate(
-            [np.where(hand.present[:, None], hand.angles, np.nan) for hand in _hands(states).values()],
+            [np.where(hand.present[:, None], hand.angles, np.nan) for hand in hands_of(states).values()],
             axis=1)).astype(np.float32))
 
     def close(self) -> None:

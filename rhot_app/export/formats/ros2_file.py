@@ -9,10 +9,10 @@ import numpy as np
 
 from rhot_app.errors import require
 from rhot_app.estimation.se3 import quaternion_from_rotation
+from rhot_app.export.formats.mcap_file import TimedMessages
 from rhot_app.export.plan import Format, Plan
-from rhot_app.export.states import HandStates
+from rhot_app.export.states import HandStates, hands_of
 from rhot_app.hand.skeleton import ANGLES
-from rhot_app.project import OTHER_HAND
 
 Message = dict[str, Any]
 
@@ -38,20 +38,14 @@ TYPES: Final = {
 _NO_TURN: Final = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 
-class Ros2Writer:
+class Ros2Writer(TimedMessages):
     """Streams messages; a hand that is not tracked has none, because ROS's types have no word for unknown."""
 
     def __init__(self, plan: Plan) -> None:
         require("mcap_ros2", "an MCAP file for ROS 2")
         from mcap_ros2.writer import Writer
 
-        self.notes: list[str] = []
-        if plan.wall_clock_offset_ns is None:
-            self.notes.append("the log does not say when it was begun; the file's times are of the master's own clock")
-        self._offset_ns = plan.wall_clock_offset_ns or 0
-        self._frame_id = "rig" if plan.frame == "rig" else "palm"
-        self._file = plan.path.open("wb")
-        self._writer = Writer(self._file)
+        super().__init__(plan, Writer)
         self._types = {name: self._writer.register_msgdef(name, text) for name, text in TYPES.items()}
         first_ns = plan.first_ns + self._offset_ns
         self._send("/tf_static", "tf2_msgs/msg/TFMessage", first_ns, {"transforms": [
@@ -60,12 +54,12 @@ class Ros2Writer:
 
     def add(self, states: HandStates) -> None:
         """Write the messages of these states."""
-        hands = [("", states)] if states.other is None else [("", states), (OTHER_HAND, states.other)]
-        turns = {prefix: quaternion_from_rotation(hand.world_from_palm[:, :3, :3]) for prefix, hand in hands}
+        hands = hands_of(states)
+        turns = {prefix: quaternion_from_rotation(hand.world_from_palm[:, :3, :3]) for prefix, hand in hands.items()}
         object_turns = [quaternion_from_rotation(one.world_from_object[:, :3, :3]) for one in states.objects]
         for number, t_master_ns in enumerate(states.t_master_ns.tolist()):
             t_ns, frames = t_master_ns + self._offset_ns, []
-            for prefix, hand in hands:
+            for prefix, hand in hands.items():
                 if not (hand.present[number] and np.isfinite(hand.joint_positions[number]).all()):
                     continue
                 header = {"stamp": _time(t_ns), "frame_id": self._frame_id}
@@ -86,15 +80,6 @@ class Ros2Writer:
     def _send(self, topic: str, kind: str, t_ns: int, message: Message) -> None:
         self._writer.write_message(topic=topic, schema=self._types[kind], message=message, log_time=t_ns,
                                    publish_time=t_ns)
-
-    def finish(self) -> None:
-        """Write the index."""
-        self._writer.finish()
-        self._file.flush()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 def _time(t_ns: int) -> Message:

@@ -147,7 +147,7 @@ class NpzWriter:
             self._objects = tuple(one.name for one in states.objects)
             column = np.stack([getattr(one, name) for one in states.objects], axis=1)
             kept = column.astype(np.float32) if column.dtype.kind == "f" else column
-            self._parts.setdefault(f"{prefix}object_{name}", []).append(_scaled_object(name, kept, self._plan.scale))
+            self._parts.setdefault(f"{prefix}object_{name}", []).append(_scaled(name, kept, self._plan.scale))
 
     def finish(self) -> None:
         """Write the archive, one array at a time."""
@@ -170,34 +170,23 @@ class NpzWriter:
 
 
 def _scaled(name: str, column: Column, scale: float) -> Column:
-    """An array in the file's unit of length; the palm's covariance has it in its translations."""
-    if scale == 1.0 or not (name.endswith(("_positions", "_covariances")) or name in ("world_from_palm",
-                                                                                      "palm_covariance")):
+    """An array (N, ...) in the file's unit of length. Poses have it in their translations; twists and the covariances
+    of poses in their first three numbers."""
+    if scale == 1.0:
         return column
-    if name.endswith("_positions"):
+    if name.endswith(("_positions", "distances", "distance_sd")):
         return column * np.float32(scale)
     if name.endswith("_covariances"):
         return column * np.float32(scale * scale)
-    out = column.copy()
-    if name == "world_from_palm":
-        out[:, :3, 3] *= np.float32(scale)
-        return out
     per = np.where(np.arange(6) < 3, scale, 1.0).astype(np.float32)
-    return out * per[:, None] * per
-
-
-def _scaled_object(name: str, column: Column, scale: float) -> Column:
-    """An array (N, K, ...) of objects in the file's unit of length."""
-    if scale == 1.0 or name in ("validity", "contacts"):
-        return column
-    if name in ("distances", "distance_sd"):
-        return column * np.float32(scale)
-    out = column.copy()
-    if name == "world_from_object":
-        out[..., :3, 3] *= np.float32(scale)
-        return out
-    per = np.where(np.arange(6) < 3, scale, 1.0).astype(np.float32)
-    return out * per if name == "velocity" else out * per[:, None] * per
+    if name == "velocity":
+        return column * per
+    if name in ("palm_covariance", "covariance"):
+        return column * per[:, None] * per
+    if name in ("world_from_palm", "world_from_object"):
+        column = column.copy()
+        column[..., :3, 3] *= np.float32(scale)
+    return column
 
 
 def _store(archive: zipfile.ZipFile, name: str, array: Column) -> None:

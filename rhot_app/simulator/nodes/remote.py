@@ -67,9 +67,8 @@ class LampRequest(_Request, frozen=True, tag="lamp"):
 
     def change(self, lamp: Lamp) -> Lamp:
         """The lamp as asked for; raises msgspec.ValidationError when there can be none like it."""
-        chosen = {name: value for name in ("brightness", "kelvin", "mains_hz", "flicker")
-                  if (value := getattr(self, name)) is not None}
-        return msgspec.convert(msgspec.to_builtins(lamp) | chosen, Lamp)
+        chosen = {name: value for name, value in msgspec.structs.asdict(self).items() if value is not None}
+        return msgspec.convert(msgspec.structs.asdict(lamp) | chosen, Lamp)
 
 
 class CoverRequest(_Request, frozen=True, tag="cover"):
@@ -150,10 +149,9 @@ class TwinRemote:
         """Show something else, from its beginning."""
         return self._ask(ShowRequest(what), ANSWER_S)
 
-    def lamp(self, *, brightness: float | None = None, kelvin: float | None = None, mains_hz: float | None = None,
-             flicker: float | None = None) -> TwinState:
-        """Change the room's lamp; see `camera_controls.Lamp`."""
-        return self._ask(LampRequest(brightness, kelvin, mains_hz, flicker), ANSWER_S)
+    def lamp(self, **change: float | None) -> TwinState:
+        """Change the room's lamp by some fields of `LampRequest`."""
+        return self._ask(LampRequest(**change), ANSWER_S)
 
     def cover(self, *cameras: str) -> TwinState:
         """Cover the lenses of these cameras, by name, and uncover all others."""
