@@ -47,6 +47,7 @@ from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter, ligh
 from rhot_app.simulator.bare_hand.skin import skin_colours  # noqa: E402
 from rhot_app.simulator.bare_hand.surface import build_surface  # noqa: E402
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter  # noqa: E402
+from rhot_app.simulator.render.painter import lit_image  # noqa: E402
 
 CURL_HZ = 15.0
 SAME_M = 1e-6
@@ -148,10 +149,10 @@ def filmed(painters: list[BareHandPainter], walls: list[np.ndarray], source: Tur
            seed: int) -> dict[int, np.ndarray]:
     shutter, out = Shutter(4e-3, 0.0), {}
     for c, painter in enumerate(painters):
-        painter.image[:] = walls[c]
-        painter.paint(source, FrameTime(shutter, painter.image.shape[1], t_s), 0)
-        noise = np.random.default_rng([seed, c]).normal(0.0, 2.0, painter.image.shape[1:])
-        smooth = cv2.GaussianBlur(painter.image.transpose(1, 2, 0).astype(np.float32), (0, 0), 0.7) + noise[..., None]
+        lit = lit_image(walls[c], np.ones(3))
+        painter.paint(lit, source, FrameTime(shutter, lit.image.shape[1], t_s), 0)
+        noise = np.random.default_rng([seed, c]).normal(0.0, 2.0, lit.image.shape[1:])
+        smooth = cv2.GaussianBlur(lit.image.transpose(1, 2, 0), (0, 0), 0.7) + noise[..., None]
         out[c] = np.clip(smooth + 0.5, 0.0, 255.0).astype(np.uint8)
     return out
 
@@ -168,7 +169,7 @@ def turning(seconds: float, seed: int = 1, outline: bool = False, amplitude_deg:
     hand = textured_hand(source, seed)
     walls = [np.ascontiguousarray(wall(camera, k, False).transpose(2, 0, 1), np.float32)
              for k, camera in enumerate(cameras)]
-    painters = [BareHandPainter(hand, camera, one, samples=4) for camera, one in zip(cameras, walls, strict=True)]
+    painters = [BareHandPainter(hand, camera, samples=4) for camera in cameras]
     empty = [np.clip(one.transpose(1, 2, 0), 0.0, 255.0).astype(np.uint8) for one in walls]
     natural = pose_prior()
     process = HandProcess(surface.dh, model.limits, natural.mean, np.asarray(np.linalg.inv(natural.information)),

@@ -66,7 +66,7 @@ def renderer(body: Body, shutter: Shutter = STILL, seed: int = 1, background: ND
     """A renderer of `body` before black, or another background (3, H, W)."""
     if background is None:
         background = np.zeros((3, CAMERA.height, CAMERA.width), np.float32)
-    painter = SolidsPainter(body, CAMERA, background, shading, seed)
+    painter = SolidsPainter(body, CAMERA, shading, seed)
     return FrameRenderer(painter, background, OPTICS, Exposure(shutter, shutter.exposure_s, lamp, NEUTRAL), seed)
 
 

@@ -22,7 +22,7 @@ CAMERA = CameraModel(WIDTH, HEIGHT, intrinsics_row([530.0, 530.0, 47.5, 31.5]), 
 def picture(lamp: Lamp, shutter: Shutter = STILL, nominal_s: float = STILL.exposure_s) -> YuvImage:
     """A white ball before mid grey."""
     background = np.full((3, HEIGHT, WIDTH), 100.0, np.float32)
-    painter = SolidsPainter(balls([0.01], [(0.0, 0.0, 0.0)], [True]), CAMERA, background, 0.0, 1)
+    painter = SolidsPainter(balls([0.01], [(0.0, 0.0, 0.0)], [True]), CAMERA, 0.0, 1)
     camera = FrameRenderer(painter, background, OPTICS, Exposure(shutter, nominal_s, lamp, NEUTRAL), 1)
     return from_i420(camera.render(Gliding((0.0, 0.0, 0.6)), 0.0, 0)[0].copy(), WIDTH, HEIGHT)
 

@@ -40,7 +40,7 @@ def pose_of(rotation_vector: Vector, middle: Vector, board: Board) -> np.ndarray
 
 
 def camera_on(board: Board, shutter: Shutter = STILL) -> FrameRenderer:
-    painter = SheetPainter(board_sheet(board), CAMERA, DARK, 0.25, 3)
+    painter = SheetPainter(board_sheet(board), CAMERA, 0.25, 3)
     return FrameRenderer(painter, DARK, OPTICS, Exposure(shutter, shutter.exposure_s, STEADY, NEUTRAL), 3)
 
 
@@ -93,7 +93,7 @@ def test_chessboard_begins_black_beside_its_first_corner_on_white_paper() -> Non
 
 
 def test_ruler_crosses_are_as_far_apart_as_said() -> None:
-    painter = SheetPainter(ruler_sheet(0.2), CAMERA, DARK, 0.0, 1)
+    painter = SheetPainter(ruler_sheet(0.2), CAMERA, 0.0, 1)
     camera = FrameRenderer(painter, DARK, OPTICS, Exposure(STILL, STILL.exposure_s, STEADY, NEUTRAL), 1)
     pose = np.eye(4)
     pose[:3, 3] = (-0.1, 0.02, 0.5)

@@ -15,7 +15,7 @@ from rhot_app.simulator.bare_hand.rasterise import SAMPLES, accumulate, unshadow
 from rhot_app.simulator.bare_hand.surface import BONES, FOREARM, Surface
 from rhot_app.simulator.render.camera_controls import level_gain
 from rhot_app.simulator.render.exposure_samples import NODES, FrameTime, power_series
-from rhot_app.simulator.render.painter import Box, Image, PoseSource
+from rhot_app.simulator.render.painter import Box, LitImage, PoseSource
 from rhot_app.simulator.render.rays import LIGHT
 
 Array = NDArray[np.float64]
@@ -89,35 +89,23 @@ class BareHand:
 class BareHandPainter:
     """A `Painter` of a bare hand. No marker is ever visible."""
 
-    def __init__(self, hand: BareHand, camera: CameraModel, background: Image, samples: int = SAMPLES) -> None:
+    def __init__(self, hand: BareHand, camera: CameraModel, samples: int = SAMPLES) -> None:
         """`samples`: pictures whose mean is a frame, a power of two up to 16."""
         self._hand, self._camera, self._samples = hand, camera, samples
-        self._colours = hand.colours
-        _, height, width = background.shape
+        height, width = camera.height, camera.width
         count = len(hand.colours)
         self._work = (np.zeros(count), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, np.uint8),
                       np.zeros_like(hand.surface.triangles))
         self._normals = np.zeros((count, 3))
         self._depth, self._cover = np.zeros((height, width), np.float32), np.zeros((height, width), np.float32)
         self._shown, self._total = (np.zeros((height, width, 3), np.float32) for _ in range(2))
-        self._background, self._image = background, background.copy()
 
-    @property
-    def image(self) -> Image:
-        """(3, H, W): what `paint` painted, the background elsewhere."""
-        return self._image
-
-    def relight(self, background: Image, level: Array) -> None:
-        """Another light: the `background` as it is lit now, and factors (3,) on the grey levels of everything else."""
-        self._background, self._image = background, background.copy()
-        self._colours = self._hand.colours * level
-
-    def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
+    def paint(self, lit: LitImage, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
         """Paint the hand as `source` moves it during the frame."""
         world_from_palm, angles = source.sample(time.nodes_s)
         hand, camera = self._hand, self._camera
         world = hand.vertices(world_from_palm, angles)
-        colours = self._shaded(world[NODES // 2]).astype(np.float32)
+        colours = self._shaded(world[NODES // 2], hand.colours * lit.level).astype(np.float32)
         local = world @ camera.camera_from_world[:3, :3].T + camera.camera_from_world[:3, 3]
         box = np.zeros(4, np.int64)
         accumulate(power_series(local), time.timing, camera.intrinsics, hand.surface.triangles, colours, self._samples,
@@ -126,11 +114,11 @@ class BareHandPainter:
         if x0 < x1:
             total = self._total[y0:y1, x0:x1].transpose(2, 0, 1)
             free = self._samples - self._cover[y0:y1, x0:x1]
-            self._image[:, y0:y1, x0:x1] = (total + free * self._background[:, y0:y1, x0:x1]) / self._samples
+            lit.image[:, y0:y1, x0:x1] = (total + free * lit.background[:, y0:y1, x0:x1]) / self._samples
         return (x0, y0, x1, y1), np.zeros(hand.marker_count)
 
-    def _shaded(self, vertices: Array) -> Array:
-        """(V, 3) levels of the vertices (V, 3) m, world, as they are lit."""
+    def _shaded(self, vertices: Array, colours: Array) -> Array:
+        """(V, 3) levels of the vertices (V, 3) m, world, of these `colours` (V, 3) in full light, as they are lit."""
         hand = self._hand
         vertex_normals(vertices, hand.surface.triangles, self._normals)
         cosine = self._normals @ hand.light
@@ -142,7 +130,7 @@ class BareHandPainter:
         half = eye / np.linalg.norm(eye, axis=1, keepdims=True) + hand.light
         half /= np.linalg.norm(half, axis=1, keepdims=True)
         sheen = _SHEEN * np.maximum(np.einsum("vi,vi->v", self._normals, half), 0.0) ** _SHEEN_POWER * direct
-        linear = (self._colours / 255.0) ** 2.2 * light[:, None] + 0.35 * sheen[:, None]
+        linear = (colours / 255.0) ** 2.2 * light[:, None] + 0.35 * sheen[:, None]
         return np.asarray(255.0 * level_gain(linear))
 
 

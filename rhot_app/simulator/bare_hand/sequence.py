@@ -174,7 +174,7 @@ class BareHandSequence:
         optics = Optics(settings.psf_sigma_px, settings.noise_mid_grey, settings.noise_read)
         exposure = Exposure(shutter, shutter.exposure_s, Lamp(), Controls())
         count = len(self.times_ns)
-        painter = KeptPainter(lambda: BareHandPainter(self.hand, camera, background), background,
+        painter = KeptPainter(lambda: BareHandPainter(self.hand, camera), background,
                               None if self.kept_in is None else self.kept_in / self._file(index), count)
         return FrameRenderer(painter, background, optics, exposure, 1000 * self.seed + index)
 

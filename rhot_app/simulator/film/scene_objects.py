@@ -23,7 +23,7 @@ from rhot_app.simulator.bare_hand.painter import BareHand, BareHandPainter
 from rhot_app.simulator.bare_hand.sequence import BareHandOptions, drawn_hand
 from rhot_app.simulator.render.body import Appearance, HandBody, build_body
 from rhot_app.simulator.render.held_painter import HeldPainter, held_cube
-from rhot_app.simulator.render.painter import Image, Painter, PoseSource
+from rhot_app.simulator.render.painter import Painter, PoseSource
 from rhot_app.simulator.render.sheet import Sheet, board_sheet, ruler_sheet
 from rhot_app.simulator.render.sheet_painter import SheetPainter
 from rhot_app.simulator.render.solids_painter import SolidsPainter
@@ -51,15 +51,15 @@ class SceneObject:
     source: PoseSource
     held: ObjectModel | None = None  # an object in the hand, at PALM_FROM_OBJECT
 
-    def painter(self, camera: CameraModel, background: Image, shading: float, seed: int) -> Painter:
-        """The painter of this act for one camera."""
+    def painter(self, camera: CameraModel, shading: float, seed: int) -> Painter:
+        """The painter of this thing for one camera."""
         if isinstance(self.thing, Sheet):
-            return SheetPainter(self.thing, camera, background, shading, seed)
+            return SheetPainter(self.thing, camera, shading, seed)
         if isinstance(self.thing, BareHand):
-            return BareHandPainter(self.thing, camera, background)
+            return BareHandPainter(self.thing, camera)
         if self.held is not None:
-            return HeldPainter(self.thing, self.held, camera, background, shading, seed)
-        return SolidsPainter(self.thing, camera, background, shading, seed)
+            return HeldPainter(self.thing, self.held, camera, shading, seed)
+        return SolidsPainter(self.thing, camera, shading, seed)
 
 
 def make_object(show: Show, scene: Scene, hidden: frozenset[str] = frozenset()) -> SceneObject:

@@ -73,7 +73,7 @@ def make_renderer(shot: Shot, index: int) -> FrameRenderer:
     """The renderer of one camera of the shot."""
     scene, camera = shot.scene, shot.scene.camera(index)
     background = background_image(scene.settings.background, camera, scene.settings.distance_m, scene.seed)
-    painter = shot.scene_object.painter(camera, background, scene.settings.shading, camera_seed(scene, index))
+    painter = shot.scene_object.painter(camera, scene.settings.shading, camera_seed(scene, index))
     return renderer_of(scene, index, painter, background)
 
 

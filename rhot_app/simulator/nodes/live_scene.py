@@ -21,7 +21,7 @@ from rhot_app.simulator.nodes.remote import CoverRequest, LampRequest, Request, 
 from rhot_app.simulator.render.body import HandBody
 from rhot_app.simulator.render.camera_controls import Lamp
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
-from rhot_app.simulator.render.painter import Painter
+from rhot_app.simulator.render.painter import Painter, lit_image
 from rhot_app.simulator.scene.background import background_image
 from rhot_app.simulator.scene.scene import Scene
 from rhot_app.simulator.scene.scene_description import RulerShow, Show
@@ -169,12 +169,12 @@ class LiveScene:
         """An act with painters that have painted once: nothing is loaded or compiled in the cameras' time."""
         scene = self._scene
         scene_object = make_object(show, scene)
-        painters = tuple(scene_object.painter(scene.camera(index), background, scene.settings.shading,
-                                              camera_seed(scene, index))
-                         for index, background in enumerate(self.backgrounds))
+        painters = tuple(scene_object.painter(scene.camera(index), scene.settings.shading, camera_seed(scene, index))
+                         for index in range(len(scene.names)))
         shutter = Shutter(1e-9 * scene.exposure_ns, 1e-9 * scene.row_time_ns)
-        for painter in painters:
-            painter.paint(scene_object.source, FrameTime(shutter, scene.preset.height, 0.0), 0)
+        for painter, background in zip(painters, self.backgrounds, strict=True):
+            painter.paint(lit_image(background, np.ones(3)), scene_object.source,
+                          FrameTime(shutter, scene.preset.height, 0.0), 0)
         return Setting(show, scene_object, painters, lamp)
 
     def _put(self, setting: Setting) -> None:

@@ -4,7 +4,7 @@ over it: a finger before the cube is not shown.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
 from rhot_app.objects.object_file import BoxShape, ObjectModel, Tag, load_object
 from rhot_app.simulator.render.exposure_samples import FrameTime
-from rhot_app.simulator.render.painter import Body, Box, Image, PoseSource
+from rhot_app.simulator.render.painter import Body, Box, LitImage, PoseSource
 from rhot_app.simulator.render.sheet import tag_sheet
 from rhot_app.simulator.render.sheet_painter import SheetPainter
 from rhot_app.simulator.render.solids_painter import SolidsPainter
@@ -49,40 +49,27 @@ class _Riding:
 class HeldPainter:
     """A `Painter` of a hand and a box with a tag on each face. A marker whose centre lies behind the box is hidden."""
 
-    def __init__(self, body: Body, held: ObjectModel, camera: CameraModel, background: Image, shading: float,
-                 seed: int) -> None:
+    def __init__(self, body: Body, held: ObjectModel, camera: CameraModel, shading: float, seed: int) -> None:
         """`shading`: share of the brightness that depends on how a surface faces the lamp."""
         assert isinstance(held.shape, BoxShape)
         self._body, self._camera = body, camera
-        self._hand = SolidsPainter(body, camera, background, shading, seed)
+        self._hand = SolidsPainter(body, camera, shading, seed)
         face_m = 1e-3 * held.shape.sides_mm[0]
         self._faces = [(PALM_FROM_OBJECT @ _object_from_tag(tag) @ _FACE_FROM_TAG,
-                        SheetPainter(tag_sheet(tag, face_m), camera, background, shading, seed + 1 + number))
+                        SheetPainter(tag_sheet(tag, face_m), camera, shading, seed + 1 + number))
                        for number, tag in enumerate(held.fiducials)]
 
-    @property
-    def image(self) -> Image:
-        """(3, H, W): what `paint` painted, the background elsewhere."""
-        return self._hand.image
-
-    def relight(self, background: Image, level: Array) -> None:
-        """Another light: the `background` as it is lit now, and factors (3,) on the grey levels of everything else."""
-        self._hand.relight(background, level)
-        for _, face in self._faces:
-            face.relight(background, level)
-
-    def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
+    def paint(self, lit: LitImage, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
         """Paint both as `source` moves them during the frame."""
-        box, visible = self._hand.paint(source, time, number)
-        image, t_s = self._hand.image, float(np.mean(time.nodes_s))
+        box, visible = self._hand.paint(lit, source, time, number)
+        t_s = float(np.mean(time.nodes_s))
         world_from_palm, angles = source.sample(np.array([t_s]))
         markers = self._camera.project(self._body.marker_positions(world_from_palm, angles)[0])
         for place, face in self._faces:
             if not self._faces_camera(world_from_palm[0] @ place):
                 continue
             riding = _Riding(source, place)
-            face.over(image.copy(), image)
-            box = _around(box, face.paint(riding, time, number)[0])
+            box = _around(box, face.paint(replace(lit, background=lit.image.copy()), riding, time, number)[0])
             outline = face.corners(riding, t_s).astype(np.float32)
             hidden = [bool(np.isfinite(pixel).all()) and cv2.pointPolygonTest(
                 outline, (float(pixel[0]), float(pixel[1])), False) > 0 for pixel in markers]

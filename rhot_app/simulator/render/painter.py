@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -50,21 +51,29 @@ class Body(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class LitImage:
+    """What a camera sees before lens and sensor, as grey levels (3, H, W): the `background` as it is lit, and the
+    `image`, which is the background until something is painted into it. `level` (3,): the light's factors on the grey
+    levels of everything else."""
+
+    background: Image
+    image: Image
+    level: Array
+
+
+def lit_image(background: Image, level: Array) -> LitImage:
+    """An image with nothing before its `background`, which is given as grey levels of full light."""
+    lit = np.ascontiguousarray(background * np.asarray(level)[:, None, None], dtype=np.float32)
+    return LitImage(lit, lit.copy(), level)
+
+
 class Painter(Protocol):
     """Paints one kind of thing before one camera. Holds work space: one thread only."""
 
-    @property
-    def image(self) -> Image:
-        """(3, H, W) light before lens and sensor, as grey levels: what was painted last, the background elsewhere."""
-        ...
-
-    def relight(self, background: Image, level: Array) -> None:
-        """Another light: the `background` (3, H, W) as it is lit now, and factors (3,) on the grey levels of everything
-        else. The image becomes the background."""
-        ...
-
-    def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
-        """Paint frame `number`; returns what may differ from the background, and the markers' visible parts (M,)."""
+    def paint(self, lit: LitImage, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
+        """Paint frame `number` as `source` moves the thing; returns what may differ from the background, and the
+        markers' visible parts (M,)."""
         ...
 
 
@@ -83,22 +92,13 @@ class KeptPainter:
         self._file = zipfile.ZipFile(path) if path is not None and path.is_file() else None
         self._painter = None if self._file else make()
         self._kept: dict[str, bytes] = {}
-        self._image, self._level = background.copy(), np.ones(3)
+        self._full = lit_image(background, np.ones(3))
 
-    @property
-    def image(self) -> Image:
-        """(3, H, W): what `paint` painted, the background elsewhere."""
-        return self._image
-
-    def relight(self, background: Image, level: Array) -> None:
-        """Another light: the `background` as it is lit now, and factors (3,) on the grey levels of everything else."""
-        self._image, self._level = background.copy(), level
-
-    def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
+    def paint(self, lit: LitImage, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
         """Paint the frame, or read it."""
         if self._painter is not None:
-            (x0, y0, x1, y1), _ = self._painter.paint(source, time, number)
-            image = self._painter.image[:, y0:y1, x0:x1]
+            (x0, y0, x1, y1), _ = self._painter.paint(self._full, source, time, number)
+            image = self._full.image[:, y0:y1, x0:x1]
             crop = np.clip(np.rint(image), 0.0, 255.0).astype(np.uint8).transpose(1, 2, 0)
             if self._path is not None:
                 self._keep(self._path, number, (x0, y0), crop)
@@ -109,7 +109,7 @@ class KeptPainter:
             data = self._file.read(name)
             crop = decode_picture(data) if data else np.zeros((0, 0, 3), np.uint8)
             y1, x1 = y0 + crop.shape[0], x0 + crop.shape[1]
-        self._image[:, y0:y1, x0:x1] = crop.transpose(2, 0, 1) * self._level[:, None, None]
+        lit.image[:, y0:y1, x0:x1] = crop.transpose(2, 0, 1) * lit.level[:, None, None]
         return (x0, y0, x1, y1) if x0 < x1 else (0, 0, 0, 0), np.zeros(0)
 
     def _keep(self, path: Path, number: int, corner: tuple[int, int], crop: NDArray[np.uint8]) -> None:

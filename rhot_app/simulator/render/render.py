@@ -17,7 +17,7 @@ from rhot_app.simulator.render.camera_controls import (
     level_gain,
 )
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter
-from rhot_app.simulator.render.painter import Box, Image, Painter, PoseSource
+from rhot_app.simulator.render.painter import Box, Image, Painter, PoseSource, lit_image
 from rhot_app.simulator.render.sensor import Sensor
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ class FrameRenderer:
         self._painter, self._background, self._optics = painter, background, optics
         self._frame = np.empty(self._height * 3 // 2 * width, np.uint8)
         self._light(exposure)
-        self._sensor = Sensor(self._lit, optics.psf_sigma_px, self._development(), seed)
+        self._sensor = Sensor(self._lit.background, optics.psf_sigma_px, self._development(), seed)
 
     @property
     def exposure(self) -> Exposure:
@@ -70,35 +70,33 @@ class FrameRenderer:
     def expose(self, exposure: Exposure) -> None:
         """Another lamp, another shutter, other settings, from the next frame on."""
         self._light(exposure)
-        self._sensor.adjust(self._lit, self._development())
+        self._sensor.adjust(self._lit.background, self._development())
 
     def show(self, painter: Painter) -> None:
         """Something else before the camera, from the next frame on."""
         self._painter = painter
-        painter.relight(self._lit, self._exposure.level)
+        self._lit.image[:] = self._lit.background
 
     def render(self, source: PoseSource, t_row0_s: float, number: int) -> tuple[NDArray[np.uint8], Array]:
         """Packed I420 frame (H * 3 / 2 * W,) whose row 0 is mid-exposed at `t_row0_s`, and visible fractions (M,)."""
         image, box, visible = self.radiance(source, t_row0_s, number)
         self._sensor.expose(image, box, self._frame)
         x0, y0, x1, y1 = box
-        image[:, y0:y1, x0:x1] = self._lit[:, y0:y1, x0:x1]
+        image[:, y0:y1, x0:x1] = self._lit.background[:, y0:y1, x0:x1]
         return self._frame, visible
 
     def radiance(self, source: PoseSource, t_row0_s: float, number: int) -> tuple[Image, Box, Array]:
         """The image before lens and sensor (3, H, W), the box that may differ from the background, visible parts."""
         time = FrameTime(self._exposure.shutter, self._height, t_row0_s)
-        box, visible = self._painter.paint(source, time, number)
-        image = self._painter.image
+        box, visible = self._painter.paint(self._lit, source, time, number)
+        image = self._lit.image
         if self._exposure.lamp.flickers:
             image *= self._flicker(time)[:, None]
             box = (0, 0, image.shape[2], self._height)
         return image, box, visible
 
     def _light(self, exposure: Exposure) -> None:
-        self._exposure = exposure
-        self._lit = np.ascontiguousarray(self._background * exposure.level[:, None, None], dtype=np.float32)
-        self._painter.relight(self._lit, exposure.level)
+        self._exposure, self._lit = exposure, lit_image(self._background, exposure.level)
 
     def _flicker(self, time: FrameTime) -> Image:
         """(H,) factors on the rows' grey levels."""

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.simulator.render.body import CAPSULE
 from rhot_app.simulator.render.exposure_samples import NODES, FrameTime, power_series
-from rhot_app.simulator.render.painter import Body, Box, Image, PoseSource
+from rhot_app.simulator.render.painter import Body, Box, LitImage, PoseSource
 from rhot_app.simulator.render.rays import light_direction, ray_table
 from rhot_app.simulator.render.scanline_bounds import area_outside, outline
-from rhot_app.simulator.render.trace import Moving, View, canvas, trace
+from rhot_app.simulator.render.trace import Canvas, Moving, View, canvas, trace
 
 Array = NDArray[np.float64]
 
@@ -22,31 +22,23 @@ class SolidsPainter:
     """A `Painter` of solids. A marker's visible part is that of its unhidden area, 0 when it is not in front of the
     camera at all."""
 
-    def __init__(self, body: Body, camera: CameraModel, background: Image, shading: float, seed: int) -> None:
+    def __init__(self, body: Body, camera: CameraModel, shading: float, seed: int) -> None:
         """`shading`: share of the brightness that depends on how a surface faces the lamp."""
         self._body, self._camera, self._shading, self._seed = body, camera, shading, seed
         self._solids = body.solids
         self._rays = ray_table(camera)
         self._light = light_direction(camera)
-        self._canvas = canvas(background, len(body.solids.kind), body.marker_count)
+        self._canvas: Canvas | None = None
 
-    @property
-    def image(self) -> Image:
-        """(3, H, W): what `paint` painted, the background elsewhere."""
-        return self._canvas.image
-
-    def relight(self, background: Image, level: Array) -> None:
-        """Another light: the `background` as it is lit now, and factors (3,) on the grey levels of everything else."""
-        solids = self._body.solids
-        self._canvas = canvas(background, len(solids.kind), self._body.marker_count)
-        self._solids = solids._replace(rgb=solids.rgb * level)
-
-    def paint(self, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
+    def paint(self, lit: LitImage, source: PoseSource, time: FrameTime, number: int) -> tuple[Box, Array]:
         """Paint the solids as `source` moves them during the frame."""
+        if self._canvas is None or self._canvas.image is not lit.image:
+            self._canvas = canvas(lit, len(self._solids.kind), self._body.marker_count)
         world_from_palm, angles = source.sample(time.nodes_s)
         series = power_series(self._body.place(self._camera.camera_from_world @ world_from_palm, angles))
         timing = time.timing
-        moving = Moving(series, self._solids, self._sweep(series, timing[2]))
+        solids = self._solids._replace(rgb=self._solids.rgb * lit.level)
+        moving = Moving(series, solids, self._sweep(series, timing[2]))
         view = View(self._rays, self._camera.intrinsics, timing, self._light, self._shading)
         box = trace(moving, view, self._canvas, self._seed * 1_000_003 + number)
         whole = self._canvas.whole + self._outside(series, timing)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rhot_app.simulator.render.body import BOUNDS, GROUP, KIND, MARKER, PARAMETERS, PLAIN, REST_GROUP, UNEVEN, Solids
 from rhot_app.simulator.render.exposure_samples import STILL_PX, evaluate
 from rhot_app.simulator.render.paint import is_painted, local_point, paint_level
+from rhot_app.simulator.render.painter import LitImage
 from rhot_app.simulator.render.raycast import NO_HIT, PREPARED, hit, lambert, prepare
 from rhot_app.simulator.render.rays import SAMPLES, scatter
 from rhot_app.simulator.render.scanline_bounds import in_block, span
@@ -119,11 +120,10 @@ class Canvas(NamedTuple):
     whole: Array
 
 
-def canvas(background: Image, solids: int, markers: int) -> Canvas:
-    """A canvas whose image is the `background` (3, H, W)."""
-    _, height, width = background.shape
-    size = (height, width)
-    return Canvas(background, background.copy(), np.zeros(size, np.int8), np.zeros(size, np.int64),
+def canvas(lit: LitImage, solids: int, markers: int) -> Canvas:
+    """A canvas of the image."""
+    size = height, _ = lit.image.shape[1:]
+    return Canvas(lit.background, lit.image, np.zeros(size, np.int8), np.zeros(size, np.int64),
                   np.zeros(size, np.uint8), np.zeros((height, solids, 2), np.int64),
                   np.zeros((height, 2), np.int64), np.zeros(markers), np.zeros(markers))
 
