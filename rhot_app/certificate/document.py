@@ -110,8 +110,6 @@ def read_certificate(path: Path) -> Certificate:
     return read_document(path, Certificate, format_name=FORMAT, version=VERSION, error=CertificateError)
 
 
-# -- comparison --------------------------------------------------------------------------------------------------------
-
 class Difference(msgspec.Struct, frozen=True):
     """A figure of both certificates. `changed`: the 95 % interval of the difference leaves out 0."""
 
@@ -155,8 +153,6 @@ def compare(before: Certificate, after: Certificate) -> tuple[list[Difference], 
                 found.append(Difference(line.title, one.name, one.unit, one.interval, match.interval))
     return found, [*notes, *(f"{line.title} is new." for line in later.values())]
 
-
-# -- numbers in sentences ----------------------------------------------------------------------------------------------
 
 def number(value: float | None, spread: float = 0.0) -> str:
     """Three significant digits, or as many as show two of `spread`, half an interval's length; no exponent; a dash for

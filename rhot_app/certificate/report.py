@@ -73,8 +73,6 @@ def _spread(one: Figure) -> float:
     return 0.0 if one.value is None or one.low is None or one.high is None else one.interval.half_width
 
 
-# -- HTML --------------------------------------------------------------------------------------------------------------
-
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1c1c1c; background: #fff; max-width: 60rem; margin: 2rem auto;
        padding: 0 1rem; }
@@ -119,8 +117,6 @@ def _section(line: Line) -> str:
         parts.append("</table>")
     return "".join(parts)
 
-
-# -- PDF ---------------------------------------------------------------------------------------------------------------
 
 def to_pdf(certificate: Certificate) -> bytes:
     """The same on A4: a table of verdicts, then a section for each line."""

@@ -114,8 +114,6 @@ def _reseeded(scene: Scene, number: int) -> Scene:
     return replace(scene, seed=scene.seed + 10_000 * (number + 1))
 
 
-# -- scene objects -----------------------------------------------------------------------------------------------------
-
 def half_height(scene: Scene) -> float:
     """m: from the middle of the picture to its border, at the nearest that the rod comes."""
     preset, nearest = scene.preset, (1.0 - float(_SWING[2])) * scene.settings.distance_m
@@ -198,8 +196,6 @@ class _Flashing:
             poses[:, 0, 3] += 50.0
         return poses, angles
 
-
-# -- raw logs of shots -------------------------------------------------------------------------------------------------
 
 def _record(shot: Shot, path: Path, screen: _Screen | None, *, sketched: bool) -> None:
     rig = simulated_rig(shot.scene)

@@ -142,7 +142,6 @@ def condition_of(state: HandState) -> Condition:
     return Condition.PARTIAL if both & {Condition.TRACKING, Condition.PARTIAL} else Condition.LOST
 
 
-# -- feeding the health monitor ----------------------------------------------------------------------------------------
 # Outside the frames' own thread.
 
 LOOK_NS = 95_000_000  # the status comes every 100 ms

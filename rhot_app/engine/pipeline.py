@@ -159,8 +159,6 @@ class Pipeline:
         self.last_state = state
 
 
-# -- rates and latencies -----------------------------------------------------------------------------------------------
-
 WINDOW = 600
 """States over which latency is summarised: five seconds at 120 Hz."""
 

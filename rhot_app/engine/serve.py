@@ -119,8 +119,6 @@ class GarbageMan:
             self._collected_s = time.monotonic()
 
 
-# -- the engine's sockets towards its clients --------------------------------------------------------------------------
-
 STATUS_NS = 100_000_000
 """Status is published ten times a second, so that a client misses an engine within one."""
 

@@ -17,8 +17,6 @@ from rhot_app.project import Rig
 from rhot_app.simulator.film.truth import Truth
 from rhot_app.state import Knowledge
 
-# -- errors of states --------------------------------------------------------------------------------------------------
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -202,7 +200,6 @@ def band(seeds: int, degrees: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-# -- figures of runs ---------------------------------------------------------------------------------------------------
 # Keys end in their unit.
 
 Figures = dict[str, float | None]

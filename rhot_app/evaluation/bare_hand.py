@@ -265,8 +265,6 @@ def _first(times_s: Array, true: NDArray[np.bool_]) -> float:
     return float(times_s[np.argmax(true)]) if true.any() else np.nan
 
 
-# -- figures ----------------------------------------------------------------------------------------------------------
-
 Figures = dict[str, float | None]
 
 

@@ -128,8 +128,6 @@ def as_fields(comparison: Comparison) -> dict[str, object]:
                                  for name in names} for motion in comparison.motions()}}
 
 
-# -- comparison table --------------------------------------------------------------------------------------------------
-
 @dataclass(frozen=True, slots=True)
 class Column:
     """One figure: its key, its heading, its form, and whether a ratio says anything."""

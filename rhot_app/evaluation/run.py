@@ -107,8 +107,6 @@ def _collect(client: EngineClient, t0_ns: int, seconds: float, progress: Progres
     return tuple(state for state in states if t0_ns <= state.t_master_ns <= end_ns)
 
 
-# -- printed report ----------------------------------------------------------------------------------------------------
-
 SETTLE_S = 1.0
 """What happens before this scene time is not judged."""
 
@@ -160,8 +158,6 @@ def details(figures: dict[str, Any]) -> str:
         lines.append(f"{stage:<17} {cell(value['p50'], '.3f'):>7}  {cell(value['p99'], '.3f'):>8}")
     return "\n".join(lines)
 
-
-# -- evaluation of a scene ---------------------------------------------------------------------------------------------
 
 Detector = Literal["fast", "reference"]
 

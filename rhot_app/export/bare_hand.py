@@ -82,8 +82,6 @@ def learn_backgrounds(videos: Sequence[CameraVideo], seconds: float | None = Non
     return learnt
 
 
-# -- The whole run ----------------------------------------------------------------------------------------------------
-
 def track_videos(rig: Rig, videos: Sequence[CameraVideo], foreground: Sequence[Foreground] | None, *,
                  known_size: bool = True, empty_s: float = 0.0, start_frame: int | None = None,
                  out: Path | None = None, pictures: Path | None = None, again: bool = False,
@@ -159,8 +157,6 @@ def lost_intervals(spent: Sequence[tuple[int, bool]]) -> tuple[tuple[float, floa
         found.append((1e-9 * (begin - spent[0][0]), 1e-9 * (spent[-1][0] - spent[0][0])))
     return tuple(found)
 
-
-# -- What is written --------------------------------------------------------------------------------------------------
 
 def check_outputs(videos: Sequence[CameraVideo], out: Path | None, pictures: Path | None, again: bool,
                   hand_file: Path | None, kept: Path | None = None) -> None:

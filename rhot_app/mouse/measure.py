@@ -55,8 +55,6 @@ def _axes(lengths_m: Array) -> Figures:
     return {name: 1e3 * float(value) for name, value in zip(_AXES, lengths_m, strict=True)}
 
 
-# -- resolution, coupling, speed, latency (4.3.5) ----------------------------------------------------------------------
-
 def resolution(turn_deg: float, seed: int, **how: Any) -> Figures:
     """Jitter of the cursor of a motionless hand, turned by `turn_deg` on the table: standard deviation per axis, mm;
     None where it was not tracked."""
@@ -147,8 +145,6 @@ def one_camera(seed: int, **how: Any) -> Figures:
     return figures
 
 
-# -- buttons -----------------------------------------------------------------------------------------------------------
-
 def buttons(seed: int, **how: Any) -> Figures:
     """Both buttons clicked in turn at random positions. `presses`: of the true hand; `right`: those that the tracked
     hand makes too; `wrong`: those that it makes alone; `late_ms`: median delay of the right ones."""
@@ -174,8 +170,6 @@ def _presses(run: MouseRun, mouse: list[MouseState], button: str) -> Array:
     down = np.array([one.is_pressed(button) for one in mouse], np.bool_)
     return np.asarray(run.times_s[1:][down[1:] & ~down[:-1]])
 
-
-# -- target test and pick and place ------------------------------------------------------------------------------------
 
 def target_script(seed: int) -> Script:
     """A hand that clicks all targets with the speed and the scatter of a person."""

@@ -173,8 +173,6 @@ def _product(a: Array, b: Array) -> Array:
                      a[0] * y - a[1] * z + a[2] * w + a[3] * x, a[0] * z + a[1] * y - a[2] * x + a[3] * w], axis=-1)
 
 
-# -- a sample as JSON --------------------------------------------------------------------------------------------------
-
 _DIGITS = 6  # micrometres, and as fine for quaternions
 
 

@@ -161,7 +161,6 @@ class Output:
         self._word, self._message = "failed", message
 
 
-# -- outputs from other packages ---------------------------------------------------------------------------------------
 # Entry points of the group ``rhot.outputs`` (docs/plugins.md).
 
 GROUP: Final = "rhot.outputs"
@@ -222,8 +221,6 @@ class PluginSink:
         if sink is not None:
             sink.close()
 
-
-# -- the outputs of a rig ----------------------------------------------------------------------------------------------
 
 MakeSink = Callable[[OutputSettings], Sink]
 

@@ -104,8 +104,6 @@ def _rate(value: str, text: str) -> float:
     return rate
 
 
-# -- published status --------------------------------------------------------------------------------------------------
-
 SECRET_VARIABLE: Final = "RHOT_WEB_SECRET"
 """Environment variable in which the engine keeps the secret of all its web views, so that a page that is open finds
 them again whenever its outputs are started anew."""

@@ -109,8 +109,6 @@ def _names(host: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*addresses, socket.gethostname(), "localhost")))
 
 
-# -- self-signed certificate -------------------------------------------------------------------------------------------
-
 DAYS: Final = 397  # browsers believe none that is longer (CA/Browser Forum, baseline requirements 6.3.2)
 _DAY_S: Final = 86400
 _TIMEOUT_S: Final = 20.0

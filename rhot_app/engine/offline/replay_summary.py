@@ -113,8 +113,6 @@ class _Span:
             yield record
 
 
-# -- replay of a smoothed log ------------------------------------------------------------------------------------------
-
 _RECORD_BYTES = 21  # around a record's data (docs/log.md)
 
 

@@ -24,8 +24,6 @@ from rhot_app.simulator.film.shot import Shot, make_renderer, save_shot
 from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
 from rhot_node.capture.yuv import YuvWriter
 
-# -- one process per camera --------------------------------------------------------------------------------------------
-
 T = TypeVar("T")
 
 Progress = Callable[[int, int], None]
@@ -104,8 +102,6 @@ def _run(shot: Shot, index: int, work: Callable[[Shot, int, Report], Any], pipe:
         except (OSError, SimulatorError) as exc:
             pipe.send(_Done(None, str(exc)))
 
-
-# -- recording to disk -------------------------------------------------------------------------------------------------
 
 TRUTH_NAME = "truth.npz"
 

@@ -32,8 +32,6 @@ from rhot_app.simulator.scene.scene_description import FARTHEST_M, NEAREST_M, Ma
 from rhot_app.sources.local_nodes import NodePorts
 from rhot_node.wire.messages import NO_FLAGS, MarkerObservation
 
-# -- rolling shutter ---------------------------------------------------------------------------------------------------
-
 Array = NDArray[np.float64]
 
 MARGIN_PX = 4.0
@@ -58,8 +56,6 @@ def at_own_rows(way: Callable[[Array], Array], see: Callable[[Array], Array], ti
     inside = ((pixels > MARGIN_PX) & (pixels < np.array(size) - 1.0 - MARGIN_PX)).all(axis=1, keepdims=True)
     return places, np.where(inside, pixels, np.nan)
 
-
-# -- ideal detector ----------------------------------------------------------------------------------------------------
 
 LOG_NAME: Final = "points.log"
 
@@ -149,8 +145,6 @@ class PointStream:
         diameter = 2.0 * radius * self._camera.intrinsics[0] / depth
         return MarkerObservation(index, float(x), float(y), float(diameter), variance, 0.0, variance, 1.0, NO_FLAGS)
 
-
-# -- disparity table ---------------------------------------------------------------------------------------------------
 
 TABLE_NAME: Final = "table.csv"
 _SECONDS = 1.0  # at each distance

@@ -144,8 +144,6 @@ def _marker_act(show: MarkerShow, scene: Scene) -> SceneObject:
                MarkerPath(place, reach, scene.seed))
 
 
-# -- motion of a single marker -----------------------------------------------------------------------------------------
-
 Array = NDArray[np.float64]
 
 _OUT_OF_VIEW_M = np.array([0.0, 50.0, 1.0])  # far below: nothing is painted
@@ -182,8 +180,6 @@ def swing_reach(half_width_m: float, half_height_m: float, baseline_m: float) ->
     marker's distance, see it all the time."""
     return 0.7 * max(half_width_m - 0.5 * baseline_m, 0.01), 0.7 * half_height_m
 
-
-# -- board poses -------------------------------------------------------------------------------------------------------
 
 PLACES = 26
 SHARED = 16  # of the places: seen whole by all cameras

@@ -37,8 +37,6 @@ from rhot_node.network.context import Context
 from rhot_node.terminal import cut_log
 from rhot_node.threads import Worker
 
-# -- control socket ----------------------------------------------------------------------------------------------------
-
 Perform = Callable[[Request], dict[str, Any]]
 
 _REQUEST_MAX = 1 << 16
@@ -94,8 +92,6 @@ def socket_path(directory: Path, name: str) -> Path:
     """Where the frames of the camera `name` are offered."""
     return directory / f"{name}.frames"
 
-
-# -- the live twin -----------------------------------------------------------------------------------------------------
 
 _NICE = 5
 LOG_NAME = "twin.log"  # where the app has it write (`EngineDirectory.twin_log_file`)

@@ -26,7 +26,6 @@ from rhot_node.capture.stream import StreamHeader, pack_header, take_settings
 from rhot_node.config import CameraSettings
 from rhot_node.errors import CameraError
 
-# -- ``stream:`` server ------------------------------------------------------------------------------------------------
 # Frames go out; what the node tells its camera comes in.
 
 _WAIT_S = 0.25  # for a node to take a frame; the rest of it then goes with the next ones, which are lost
@@ -120,8 +119,6 @@ class FrameSocket:
             self._path.unlink()
 
 
-# -- rendered cameras --------------------------------------------------------------------------------------------------
-
 CORE_SHARE = 0.6
 """Part of one processor core that rendering may take; engine, nodes and window need the rest."""
 
@@ -211,8 +208,6 @@ class LiveCameras:
         shutter = Shutter(exposure_s, renderer.exposure.shutter.row_time_s)
         renderer.expose(replace(renderer.exposure, shutter=shutter, controls=controls_of(wanted)))
 
-
-# -- frame rate check --------------------------------------------------------------------------------------------------
 
 WINDOW_S = 2.0
 """Rates are means over this long: a single late frame is none of the user's business."""

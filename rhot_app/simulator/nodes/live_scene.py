@@ -28,8 +28,6 @@ from rhot_app.simulator.scene.scene_description import RulerShow, Show
 
 Array = NDArray[np.float64]
 
-# -- A foreign tracker on the hand -------------------------------------------------------------------------------------
-
 RATE_HZ = 120.0
 DELAY_S = 0.037
 """s: what it reports at an instant is the pose of so long ago."""
@@ -72,8 +70,6 @@ def world_from_body(scene_object: SceneObject, marker: int, times_s: Array) -> A
         return scene_object.thing.marker_poses(transforms, angles, marker)
     return transforms
 
-
-# -- the scene ---------------------------------------------------------------------------------------------------------
 
 TAKE_UP_S = 5.0
 """A change is taken up with the next frame; a twin that needs longer is stuck."""

@@ -24,7 +24,6 @@ from rhot_node.threads import Worker
 from rhot_node.wire.codec import decode, encode
 from rhot_node.wire.messages import Start, StartEntry
 
-# -- faults of a network -----------------------------------------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
 class Impairment:
@@ -80,8 +79,6 @@ class DelayQueue:
         """When the next datagram arrives; None when none is on its way."""
         return self._heap[0][0] if self._heap else None
 
-
-# -- UDP proxy ---------------------------------------------------------------------------------------------------------
 
 Address = tuple[str, int]
 

@@ -32,7 +32,6 @@ from rhot_app.simulator.scene.scene_description import Show
 from rhot_node.files import decode_message
 from rhot_node.network.context import Context
 
-# -- requests and answers ----------------------------------------------------------------------------------------------
 # Stage, lamp and caps on lenses belong to the room, not to the rig: nothing that is asked here reaches nodes or engine
 # but as pictures.
 
@@ -101,8 +100,6 @@ def refusal(sentence: str) -> dict[str, Any]:
     """The answer to what cannot be done."""
     return {"ok": False, "error": sentence}
 
-
-# -- client ------------------------------------------------------------------------------------------------------------
 
 ANSWER_S = 180.0
 """A show that was never shown on this machine is compiled first."""

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rhot_node.config import CameraSettings
 
-# -- lamp --------------------------------------------------------------------------------------------------------------
 # Colours of the scene are grey levels 0..255 as a camera delivers them, encoded with a gamma of 2.2. Light adds up
 # before that encoding, so a factor g on the light is a factor g^(1/2.2) on the grey level.
 
@@ -80,8 +79,6 @@ def _planck_xyz(kelvin: float) -> Array:
         y = ((3.0817580 * x - 5.87338670) * x + 3.75112997) * x - 0.37001483
     return np.array([x / y, 1.0, (1.0 - x - y) / y])
 
-
-# -- camera settings ---------------------------------------------------------------------------------------------------
 
 FULL: Final = 255.0
 _MID_GREY: Final = 128.0

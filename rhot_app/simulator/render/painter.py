@@ -77,8 +77,6 @@ class Painter(Protocol):
         ...
 
 
-# -- kept pictures -----------------------------------------------------------------------------------------------------
-
 class KeptPainter:
     """A `Painter` that keeps what another one painted in a file, and reads it from there the next time.
 

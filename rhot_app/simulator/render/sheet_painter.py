@@ -175,8 +175,6 @@ def box_of(corners_px: Array, depths: Array, width: int, height: int) -> Indices
     return np.array([x0, y0, x1, y1] if x0 < x1 and y0 < y1 else [0, 0, 0, 0]).astype(np.int64)
 
 
-# -- painter -----------------------------------------------------------------------------------------------------------
-
 _TAUS = np.array([-1.0, 0.0, 1.0])
 
 

@@ -75,8 +75,6 @@ def mark_edges(ids: NDArray[np.int8], edges: NDArray[np.uint8], rows: Indices, t
                     edges[j, i] = 1
 
 
-# -- two passes --------------------------------------------------------------------------------------------------------
-
 class Moving(NamedTuple):
     """N `solids` during one frame. `series` (N, PARAMETERS, NODES): their parameters in the camera's frame. `sweep`
     (N, 2): px travelled in x and y during the exposure."""

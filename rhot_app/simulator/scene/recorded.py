@@ -26,7 +26,6 @@ from rhot_app.recording.qualisys import read_qualisys
 from rhot_app.simulator.scene.motion import FACING, WRIST_BELOW_CENTRE_M, Motion, Sway, SwayCurve
 from rhot_node.files import read_table
 
-# -- reading recordings ------------------------------------------------------------------------------------------------
 # Read here: Qualisys TSV exports (optical markers on fingertips and finger middles, a triad on the back of the hand)
 # and Leap Motion CSV exports (joint positions). Millimetres in the files, metres from here on.
 
@@ -106,8 +105,6 @@ def _leap(text: str) -> Landmarks:
     return Landmarks(times[later] - times[0], 1e-3 * points[later], np.empty((int(later.sum()), 0, 3)),
                      np.stack([joints, joints], axis=1), np.zeros(len(joints)))
 
-
-# -- fitting the hand model --------------------------------------------------------------------------------------------
 
 LANDMARK_SD_M = 3e-3
 RIGID_SD_M = 2e-3

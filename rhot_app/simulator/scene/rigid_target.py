@@ -70,8 +70,6 @@ def ball_on_stick(markers: MarkerSet, index: int) -> RigidTarget:
         ends=np.array([[np.zeros(3), [0.0, POINT_M, 0.0]], [top, top + down]]), centres=centres)
 
 
-# -- motion of a calibration board -------------------------------------------------------------------------------------
-
 STILL_S = 2.0
 MOVE_S = 0.9
 _TREMOR_HZ = np.array([0.9, 2.3, 8.7])
