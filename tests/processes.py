@@ -161,11 +161,11 @@ def preload(package: str) -> None:
         from rhot_node.files import resource_path
         make_detector(load_settings(resource_path("nodes", "left.json")))
     else:
-        from synthetic_node import synthetic_rig
-
         from rhot_app.engine.pipeline import warm_up
+        from rhot_app.project import load_rig
         from rhot_app.tracking.scene import make_tracker
-        rig = synthetic_rig()
+        from rhot_node.files import resource_path
+        rig = load_rig(resource_path("rigs", "two_pis.json"))
         warm_up(make_tracker(rig), rig)
 
 

@@ -115,9 +115,10 @@ def test_lsl_client(stream: Callable[..., Stream], tmp_path: Path, monkeypatch: 
     monkeypatch.setenv("LSLAPICFG", str(settings))
     del pylsl
     name = f"RHOT {os.getpid()}"
-    code = ("import sys, time; sys.path.insert(0, sys.argv[1]); from streams import Stream; from rhot_app.simulator."
-            "nodes.synthetic_node import synthetic_rig; Stream(synthetic_rig(), sys.argv[2]); time.sleep(3600)")
-    with subprocess.Popen([sys.executable, "-c", code, str(Path(__file__).parent), f"lsl:{name}"]) as sender:
+    here = Path(__file__).parent
+    code = (f"import sys, time; sys.path[:0] = [{str(here)!r}, {str(here.parent)!r}]; from streams import Stream; "
+            "from synthetic_node import synthetic_rig; Stream(synthetic_rig(), sys.argv[1]); time.sleep(3600)")
+    with subprocess.Popen([sys.executable, "-c", code, f"lsl:{name}"]) as sender:
         try:
             with running(program("LSL", _RHOT=name)) as lines:
                 def at_full_rate() -> bool:

@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 
 from rhot_app.errors import OutputError
 from rhot_app.hand.model import neutral_pose
-from rhot_app.outputs import output as output_file
+from rhot_app.outputs import outputs as output_file
 from rhot_app.outputs.joints import JointConverter, Sample
 from rhot_app.outputs.outputs import QUEUE, Output, Outputs
 from rhot_app.project import OutputSettings, Rig
