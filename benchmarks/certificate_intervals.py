@@ -20,9 +20,9 @@ from tables import arguments, publish, table
 from rhot_app.certificate.certify import certify
 from rhot_app.certificate.document import Certificate
 from rhot_app.certificate.recordings import ProtocolFile, read_recording
-from rhot_app.certificate.simulated import Lengths, record_protocol, simulated_rig
+from rhot_app.certificate.simulated import Lengths, record_protocol
 from rhot_app.project import Rig
-from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import build_rig, make_scene, twin_defaults
 
 LENGTHS = Lengths()
 FACTORS = (0.99, 1.01)
@@ -68,7 +68,7 @@ def main() -> int:
     for seed in range(1, args.seeds + 1):
         with tempfile.TemporaryDirectory() as name:
             folder, scene = Path(name), make_scene(twin_defaults(), seed)
-            protocol, rig = record_protocol(scene, folder, sketched=not args.pictures), simulated_rig(scene)
+            protocol, rig = record_protocol(scene, folder, sketched=not args.pictures), build_rig(scene)
             made = certify(folder, protocol, rig)
             for code, what, truth in (*TRUTHS, ("latency", "screen to master", delay_ms(folder, protocol, rig))):
                 found = made.line(code).figure(what)

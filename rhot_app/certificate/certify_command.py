@@ -129,12 +129,12 @@ def _recorded(args: argparse.Namespace, folder: Path, line: ProgressLine) -> tup
 
     rig = None if args.rig is None else load_rig(args.rig)
     if args.simulated:
-        from rhot_app.certificate.simulated import record_protocol, simulated_rig
-        from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+        from rhot_app.certificate.simulated import record_protocol
+        from rhot_app.simulator.scene.scene import build_rig, make_scene, twin_defaults
 
         scene = make_scene(twin_defaults(), args.seed)
         protocol = record_protocol(scene, folder, sketched=args.sketched, progress=within(line.report, 0.0, 0.5))
-        return rig or simulated_rig(scene), protocol
+        return rig or build_rig(scene), protocol
     assert rig is not None
     if args.step or args.recordings is not None:
         given = protocol_of_steps(args.step)

@@ -73,7 +73,7 @@ def judge_depth(readings: Sequence[DistanceReading], rig: Rig) -> Line:
     scale = Interval(line.values[1] - 1.0, line.low(1) - 1.0, line.high(1) - 1.0).scaled(100.0)
     zero = Interval(line.values[0], line.low(0), line.high(0)).scaled(1e3)
     off = 100.0 * (seen / ruler - 1.0)
-    left = Interval(*(1e3 * x for x in _spread_of(line.residuals, 2)))
+    left = Interval(*(1e3 * x for x in _spread_about_line(line.residuals)))
     geometry = geometry_of(rig)
     figures = [
         figure("scale error", "%", scale, expected=0.0),
@@ -169,9 +169,9 @@ def _fit(design: Array, data: Array, sd: Array) -> _Fit:
     return _Fit(values, np.sqrt(inflation * np.diag(covariance)), factor, residuals, cost)
 
 
-def _spread_of(residuals: Array, taken: int) -> tuple[float, float, float]:
-    """rms of residuals with `taken` parameters fitted, and its chi-squared interval."""
-    freedom, total = len(residuals) - taken, float(residuals @ residuals)
+def _spread_about_line(residuals: Array) -> tuple[float, float, float]:
+    """rms of the residuals of a line, and its chi-squared interval."""
+    freedom, total = len(residuals) - 2, float(residuals @ residuals)
     low, high = stats.chi2.ppf((0.975, 0.025), freedom)
     return math.sqrt(total / freedom), math.sqrt(total / low), math.sqrt(total / high)
 

@@ -26,7 +26,6 @@ from rhot_app.certificate.recordings import (
     write_protocol,
 )
 from rhot_app.progress import Progress, silent
-from rhot_app.project import Rig
 from rhot_app.simulator.film.film import for_each_camera
 from rhot_app.simulator.film.node_log import T0_MASTER_NS, Sending, detected, write_node_log
 from rhot_app.simulator.film.points import PointNoise, PointStream
@@ -37,7 +36,6 @@ from rhot_app.simulator.render.painter import PoseSource
 from rhot_app.simulator.scene.rigid_target import BALL_RADIUS_M, STICK_RGB, RigidTarget, capsules
 from rhot_app.simulator.scene.scene import Scene, build_rig
 from rhot_app.simulator.scene.scene_description import MarkerShow
-from rhot_app.sources.local_nodes import NodePorts
 
 Array = NDArray[np.float64]
 
@@ -59,11 +57,6 @@ class Lengths:
     plumb_s: float = 3.0
     screen_s: float = 0.012
     distances_m: tuple[float, ...] = DISTANCES_M
-
-
-def simulated_rig(scene: Scene) -> Rig:
-    """The rig that a perfect calibration of the scene would give."""
-    return build_rig(scene, (NodePorts(0, 0, 0),) * len(scene.names))
 
 
 def record_protocol(scene: Scene, folder: Path, *, sketched: bool, lengths: Lengths | None = None,
@@ -198,7 +191,7 @@ class _Flashing:
 
 
 def _record(shot: Shot, path: Path, screen: _Screen | None, *, sketched: bool) -> None:
-    rig = simulated_rig(shot.scene)
+    rig = build_rig(shot.scene)
     if sketched:
         streams = [PointStream(shot, rig, index, PointNoise(loss=0.0)) for index in range(len(rig.nodes))]
         records = [record for stream in streams

@@ -169,17 +169,16 @@ LEAST_S = 0.25
 class RateMeter:
     """Events per second over the last second. One thread writes, another may read."""
 
-    def __init__(self, window_s: float = 1.0) -> None:
+    def __init__(self) -> None:
         self._times: deque[int] = deque(maxlen=4096)
-        self._window_ns = round(1e9 * window_s)
 
     def tick(self, t_ns: int) -> None:
         """Note one event."""
         self._times.append(t_ns)
 
     def rate_hz(self, now_ns: int) -> float:
-        """Events per second in the window that ends now."""
-        recent = [t for t in self._times.copy() if now_ns - t <= self._window_ns]
+        """Events per second in the second that ends now."""
+        recent = [t for t in self._times.copy() if now_ns - t <= 1_000_000_000]
         if len(recent) < 2 or recent[-1] == recent[0]:
             return 0.0
         # Intervals, not events: a window cut between two events would else flicker by one.

@@ -42,12 +42,11 @@ class SearchedNodes:
     for, so that a run can be repeated; `states` are those that came of it."""
 
     def __init__(self, tracker: Tracker, foreground: Sequence[Foreground], markers: int, *,
-                 forget: bool = False, rounded_ns: int = 0) -> None:
+                 forget: bool = False) -> None:
         """`foreground`: what each camera has learnt. `markers`: of the rig's set. `forget`: requests are given back as
-        a log has them. `rounded_ns`: by which the times of edges and maps differ from those of the markers."""
+        a log has them."""
         tracker.warm_up()
         self.tracker, self.foreground, self.markers, self.forget = tracker, list(foreground), markers, forget
-        self.rounded_ns = rounded_ns
         self.asked: list[SliceRequest | None] = [None] * len(foreground)
         self.states: list[HandState] = []
 
@@ -68,13 +67,12 @@ class SearchedNodes:
                                           else pixels[camera]))
             if request is None:
                 continue
-            searched_ns = t_ns + self.rounded_ns
             if len(request.slices):
                 found = find_edges(image, request.slices, known, noise_of(image))
                 answered = replace(request, expected=None) if self.forget else request
-                self.give(EdgeFrame(camera, searched_ns, 0, t_ns + AGE_NS, 0.004, 0.001, answered, found))
+                self.give(EdgeFrame(camera, t_ns, 0, t_ns + AGE_NS, 0.004, 0.001, answered, found))
             if request.map_step:
-                self.give(ForegroundFrame(camera, searched_ns, 0, t_ns + AGE_NS, request.map_step,
+                self.give(ForegroundFrame(camera, t_ns, 0, t_ns + AGE_NS, request.map_step,
                                           foreground_map(image, known, request.map_step)))
 
     def give(self, frame: CameraFrame) -> None:

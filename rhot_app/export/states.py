@@ -189,12 +189,12 @@ def hands_of(states: HandStates) -> dict[str, HandStates]:
     return {"": states} if states.other is None else {"": states, OTHER_HAND: states.other}
 
 
-def in_blocks(states: Iterable[HandState], size: int = BLOCK) -> Iterator[HandStates]:
-    """States as they come, `size` at a time."""
+def in_blocks(states: Iterable[HandState]) -> Iterator[HandStates]:
+    """States as they come, BLOCK at a time."""
     waiting: list[HandState] = []
     for state in states:
         waiting.append(state)
-        if len(waiting) == size:
+        if len(waiting) == BLOCK:
             yield states_of(waiting)
             waiting = []
     if waiting:

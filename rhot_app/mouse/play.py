@@ -34,7 +34,6 @@ from rhot_app.simulator.film.node_log import T0_MASTER_NS
 from rhot_app.simulator.scene.motion import WRIST_BELOW_CENTRE_M, Sway
 from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import Scene, build_rig, make_scene, twin_defaults
-from rhot_app.sources.local_nodes import NodePorts
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.scene import make_tracker
 from rhot_node.detect.foreground import learn_background, skin_foreground
@@ -170,7 +169,7 @@ def _markers(set_up: SetUp, scene: Scene, motion: Path, seconds: float, blocked_
 def _bare_hand(set_up: SetUp, scene: Scene, motion: Path, seconds: float, blocked_s: float, watch: Watch) -> _Played:
     """Rendered images, searched as the tracker requests. The hand enters before the script begins."""
     lead_s = EMPTY_S + ENTRY_S
-    whole = build_rig(scene, (NodePorts(0, 0, 0),) * len(scene.names))
+    whole = build_rig(scene)
     model = build_model(scene.hand)
     moved = replace(load_motion(str(motion), model, scene.centre, scene.seed), facing=FACINGS[set_up.facing])
     source = MovedSource(moved, -lead_s, enters_s=EMPTY_S,

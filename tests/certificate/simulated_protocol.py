@@ -8,9 +8,9 @@ from pathlib import Path
 import msgspec
 
 from rhot_app.certificate.recordings import ProtocolFile
-from rhot_app.certificate.simulated import Lengths, record_protocol, simulated_rig
+from rhot_app.certificate.simulated import Lengths, record_protocol
 from rhot_app.project import Rig
-from rhot_app.simulator.scene.scene import make_scene, twin_defaults
+from rhot_app.simulator.scene.scene import build_rig, make_scene, twin_defaults
 
 SHORT = Lengths(static_s=4.0, distance_s=0.8, rod_s=10.0, flash_s=10.0, plumb_s=1.5,
                 distances_m=(0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 1.0))
@@ -30,7 +30,7 @@ def recorded(folder: Path, seed: int, lengths: Lengths = SHORT) -> Recorded:
     """Make it."""
     folder.mkdir()
     scene = make_scene(twin_defaults(), seed)
-    return Recorded(folder, record_protocol(scene, folder, sketched=True, lengths=lengths), simulated_rig(scene))
+    return Recorded(folder, record_protocol(scene, folder, sketched=True, lengths=lengths), build_rig(scene))
 
 
 def with_baseline(rig: Rig, factor: float) -> Rig:

@@ -29,7 +29,6 @@ from rhot_app.simulator.film.truth import FrameTruth, save_truth, true_object
 from rhot_app.simulator.render.sheet import Sheet
 from rhot_app.simulator.scene.scene import Scene, build_rig
 from rhot_app.simulator.scene.scene_description import FARTHEST_M, NEAREST_M, MarkerShow
-from rhot_app.sources.local_nodes import NodePorts
 from rhot_node.wire.messages import NO_FLAGS, MarkerObservation
 
 Array = NDArray[np.float64]
@@ -161,7 +160,7 @@ def write_distances(scene: Scene, distances_m: Sequence[float], folder: Path, no
                                  f"{100 * distance:g} cm.")
     rows = [(100.0 * distance, disparity(scene, distance, noise)) for distance in distances_m]
     with new_folder(folder) as work:
-        save_rig(work / RIG_NAME, build_rig(scene, (NodePorts(0, 0, 0),) * len(scene.names)))
+        save_rig(work / RIG_NAME, build_rig(scene))
         with (work / TABLE_NAME).open("w", newline="") as file:
             table = csv.writer(file)
             table.writerow(("real_cm", "disparity_px"))

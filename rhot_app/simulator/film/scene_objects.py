@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from rhot_app.barehand.start import start_pose_file
 from rhot_app.errors import SimulatorError
 from rhot_app.geometry.camera import CameraModel
+from rhot_app.geometry.transforms import rigid
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.objects.object_file import ObjectModel, save_object
@@ -232,19 +233,13 @@ def table_place(sheet: Sheet, scene_centre: Array) -> Array:
     down = np.array([0.0, np.cos(TABLE_PITCH_RAD), np.sin(TABLE_PITCH_RAD)])
     right = Rotation.from_rotvec(_TABLE_YAW_RAD * down).apply([1.0, 0.0, 0.0])
     rotation = np.stack([right, np.cross(down, right), down], axis=1)
-    return _rigid(rotation, scene_centre + _BELOW_M - rotation @ sheet.middle)
+    return rigid(rotation, scene_centre + _BELOW_M - rotation @ sheet.middle)
 
 
 def held_place(sheet: Sheet, scene_centre: Array) -> Array:
     """(4, 4) world_from_sheet of a sheet held before the cameras, slightly turned."""
     rotation = Rotation.from_rotvec([0.12, -0.2, 0.15]).as_matrix()
-    return _rigid(rotation, scene_centre - rotation @ sheet.middle)
-
-
-def _rigid(rotation: Array, translation: Array) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, translation
-    return pose
+    return rigid(rotation, scene_centre - rotation @ sheet.middle)
 
 
 def _candidates(sheet: Sheet, cameras: Sequence[CameraModel], rng: np.random.Generator) -> _Candidates:

@@ -123,12 +123,11 @@ class _Way:
 class UdpProxy:
     """Stands between the master and the node `node_id` that listens on `node_port` of this machine.
 
-    `impairment` applies to observations, `control` to clock, start and stop messages (both ways). `start` runs it in a
+    `impairment` applies to observations; clock, start and stop messages pass as they are. `start` runs it in a
     thread of its own. Raises SimulatorError when no port can be had.
     """
 
-    def __init__(self, node_id: int, node_port: int, impairment: Impairment, *, control: Impairment | None = None,
-                 seed: int = 0) -> None:
+    def __init__(self, node_id: int, node_port: int, impairment: Impairment, *, seed: int = 0) -> None:
         self._node_id = node_id
         self._data_port: int | None = None
         try:
@@ -136,9 +135,8 @@ class UdpProxy:
         except OSError as exc:
             raise SimulatorError(f"the network proxy of node {node_id} gets no UDP port: {exc.strerror}.") from exc
         command, toward_node, data = self._sockets
-        control = control or Impairment()
-        self._to_node = _Way(command, toward_node, control, [seed, node_id, 0])
-        self._to_master = _Way(toward_node, command, control, [seed, node_id, 1])
+        self._to_node = _Way(command, toward_node, Impairment(), [seed, node_id, 0])
+        self._to_master = _Way(toward_node, command, Impairment(), [seed, node_id, 1])
         self._observations = _Way(data, command, impairment, [seed, node_id, 2])
         self._to_node.target = (_HOST, node_port)
         self._selector = selectors.DefaultSelector()

@@ -102,18 +102,15 @@ class Controls(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     contrast: Annotated[float, Meta(ge=0, le=32)] = 1.0
 
 
+_RANGES: Final = {"gain": (1e-3, 1000.0), "red_gain": (1e-3, 1000.0), "blue_gain": (1e-3, 1000.0),
+                  "saturation": (0.0, 32.0), "brightness": (-1.0, 1.0), "contrast": (0.0, 32.0)}
+
+
 def controls_of(camera: CameraSettings) -> Controls:
     """What a node tells its camera; what it leaves open stays neutral, what is out of range is taken to its end."""
-    def within(value: float | None, default: float, low: float, high: float) -> float:
-        return default if value is None else min(max(value, low), high)
-
-    return Controls(
-        gain=within(camera.gain, 1.0, 1e-3, 1000.0),
-        red_gain=within(camera.red_gain, 1.0, 1e-3, 1000.0),
-        blue_gain=within(camera.blue_gain, 1.0, 1e-3, 1000.0),
-        saturation=within(camera.saturation, 1.0, 0.0, 32.0),
-        brightness=within(camera.brightness, 0.0, -1.0, 1.0),
-        contrast=within(camera.contrast, 1.0, 0.0, 32.0))
+    told = {name: getattr(camera, name) for name in _RANGES}
+    return Controls(**{name: min(max(told[name], low), high) for name, (low, high) in _RANGES.items()
+                       if told[name] is not None})
 
 
 Triple = tuple[np.float32, np.float32, np.float32]

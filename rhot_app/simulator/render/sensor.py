@@ -163,7 +163,7 @@ def to_planes(rgb: Image, how: Development, box: Box, means: Planes, sigmas: Pla
 
 
 @njit(cache=True, fastmath=True, inline="always")
-def _mixed(mix: Triple, r: float, g: float, b: float) -> float:
+def _mixed(mix: Triple, r: float, g: float, b: float) -> np.float32:
     return mix[0] * r + mix[1] * g + mix[2] * b
 
 

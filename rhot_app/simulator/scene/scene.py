@@ -200,8 +200,10 @@ def node_settings(scene: Scene, index: int, *, detector: Literal["fast", "refere
         clock=ClockSettings(offset_s=scene.clocks[index].offset_s, drift_ppm=scene.clocks[index].drift_ppm))
 
 
-def build_rig(scene: Scene, ports: tuple[NodePorts, ...], objects: tuple[RigObject, ...] = ()) -> Rig:
-    """The rig file that a perfect calibration of this scene would give, with the daemons' real ports."""
+def build_rig(scene: Scene, ports: tuple[NodePorts, ...] = (), objects: tuple[RigObject, ...] = ()) -> Rig:
+    """The rig file that a perfect calibration of this scene would give, with the daemons' real ports, if there are
+    daemons."""
+    ports = ports or (NodePorts(0, 0, 0),) * len(scene.names)
     nodes = tuple(
         RigNode(node_id=index + 1, name=name, intrinsics=scene.intrinsics, pose=scene.poses[index],
                 udp_port=ports[index].udp_port, control_port=ports[index].control_port,
