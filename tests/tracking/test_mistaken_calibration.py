@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from knocked_rig import moved
 from modelled_hand import after_s, deviations, model_rig, moving, observations_of, states_of
+from synthetic_rig import seconds
 
+from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.state import Knowledge
 
 RIG = model_rig()
@@ -15,11 +17,12 @@ SECONDS = 3.0
 KNOCK_S = 1.5
 
 
-def mistaken(turn):
-    """The rig, with another turn (3,) rad of its second camera."""
-    first, second = RIG.nodes
-    return msgspec.structs.replace(RIG, nodes=(first, msgspec.structs.replace(
-        second, pose=moved(second.pose, np.array([*turn, 0.0, 0.0, 0.0])))))
+def mistaken(turn, rig=RIG, camera=1):
+    """The rig, with another turn (3,) rad of one camera."""
+    nodes = list(rig.nodes)
+    nodes[camera] = msgspec.structs.replace(
+        nodes[camera], pose=moved(nodes[camera].pose, np.array([*turn, 0.0, 0.0, 0.0])))
+    return msgspec.structs.replace(rig, nodes=tuple(nodes))
 
 
 def knocked(frames, down_px):
@@ -55,3 +58,27 @@ def test_a_camera_that_is_knocked_is_turned_back(down_px):
     assert share_measured(after) > 0.9
     assert shake_mm(after) < 1.5 * shake_mm(before)
     assert deviations(after, moving("rest")).rms_mm < deviations(before, moving("rest")).rms_mm + 1.5
+
+
+def test_turns_are_against_the_first_camera_that_is_tracked_with():
+    rig = model_rig(cameras=3)
+    nodes = [*rig.nodes]
+    nodes[0] = msgspec.structs.replace(nodes[0], pose=nodes[1].pose, pose_known=False)
+    rig = msgspec.structs.replace(rig, nodes=tuple(nodes))
+    truth = moving("rest")
+    frames = observations_of(model_rig(cameras=3), truth, SECONDS)
+    exact, states = (after_s(states_of(one, frames), 1.0) for one in (rig, mistaken((1e-3, 0.0, 0.0), rig, 2)))
+    assert share_measured(states) > 0.95
+    assert shake_mm(states) < 1.25 * shake_mm(exact)
+    assert deviations(exact, truth).rms_mm < 1.5
+    assert deviations(states, truth).rms_mm < 3.0
+
+
+def test_bones_do_not_decide_how_far_the_hand_is():
+    """A hand file 3 % too large: the cameras' vergence is believed, not the bones, and the hand stays where it is."""
+    larger = msgspec.structs.replace(RIG, hand=scaled_hand(RIG.hand, 1.03))
+    truth = moving("rest")
+    states = after_s(states_of(larger, observations_of(RIG, truth, SECONDS)), 1.0)
+    found = np.array([state.fingertip_positions[:, 2].mean() for state in states])
+    there = truth(np.array([seconds(state) for state in states]))[:, :5, 2].mean(axis=1)
+    assert 1e3 * np.abs(found - there).max() < 3.0

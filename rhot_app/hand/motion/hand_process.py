@@ -43,37 +43,38 @@ _GROUPS = np.repeat((0, 1, 2), (3, 3, _COUNT))
 
 
 class HandProcess(PoseState):
-    """Implements `estimation.residual.Process`; M markers.
+    """Implements `estimation.residual.Process`; L errors that last, three numbers each.
 
     `dh` has a point for each marker; without points there is no null-space reset. `limits` (21, 2) rad.
     `mean` (21,) rad and `covariance` (21, 21) of the pose prior. `spread` (2,): standard deviations of the palm's
     translation, m, and rotation, rad, over one correlation time.
-    `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `bias` (M, 3, 3) m^2:
-    covariances of the paint biases, and `bias_s`, one for all or (M,), their correlation times.
+    `slowest` (3,) and `fastest` 1/s: limits of the rates of translation, rotation and angles. `lasting` (L, 3, 3):
+    covariances of errors that last, m^2 of paint, rad^2 of a camera's turn, and `lasting_s`, one for all or (L,), their
+    correlation times.
     """
 
     def __init__(self, dh: DhArrays, limits: Array, mean: Array, covariance: Array, spread: Array, slowest: Array,
-                 fastest: float, bias: Array, bias_s: float | Array) -> None:
+                 fastest: float, lasting: Array, lasting_s: float | Array) -> None:
         self.dh, self._limits, self.mean = dh, limits, mean
         self._angles, self._information = covariance, np.linalg.inv(covariance)
         self._spread, self._slowest, self._fastest = spread, slowest, np.full(3, fastest)
-        self._bias_s = np.full(len(bias), bias_s, dtype=np.float64)
+        self._lasting_s = np.full(len(lasting), lasting_s, dtype=np.float64)
         self._marked = len(dh.point_row) > 0
-        self.size = MOTION + 3 * len(bias)
+        self.size = MOTION + 3 * len(lasting)
         self.stationary = np.zeros((self.size, self.size))
         for order, scale in enumerate((1.0, fastest**2 / 3.0, fastest**4 / 3.0)):  # value, velocity, acceleration
             first = POSE * order
             palm, angles = range(first, first + 6), slice(first + 6, first + POSE)
             self.stationary[palm, palm] = scale * np.repeat(spread, 3) ** 2
             self.stationary[angles, angles] = scale * covariance
-        self.set_bias(bias)
+        self.set_lasting(lasting)
 
-    def set_bias(self, bias: Array) -> None:
-        """Change the covariances (M, 3, 3) m^2 of the paint biases."""
-        self._bias = bias
-        for m in range(len(bias)):
+    def set_lasting(self, lasting: Array) -> None:
+        """Change the covariances (L, 3, 3) of the errors that last."""
+        self._lasting = lasting
+        for m in range(len(lasting)):
             own = slice(MOTION + 3 * m, MOTION + 3 * m + 3)
-            self.stationary[own, own] = bias[m]
+            self.stationary[own, own] = lasting[m]
 
     def start(self, world: Array, angles: Array, place_sd: tuple[float, float]) -> tuple[Array, Array]:
         """State and covariance of a hand at `world` (4, 4) with `angles` (21,), everything else as the stationary
@@ -102,7 +103,7 @@ class HandProcess(PoseState):
                                                                 self._information)
                 _reset_covariance(covariance, projection, null_covariance, self.rates(state)[2])
             _predict(state, covariance, dt_s, self.mean, self._angles, self._information, self._spread,
-                     self._slowest, self._fastest, self._bias, self._bias_s)
+                     self._slowest, self._fastest, self._lasting, self._lasting_s)
         return state, covariance
 
     def transition(self, state: Array, dt_s: float) -> Array:
@@ -112,15 +113,15 @@ class HandProcess(PoseState):
             if self._marked:
                 _project(_reset_null_space(after, self.dh, self._limits, self.mean, self._information)[0], out)
             _transition(after, out, dt_s, self.mean, self._information, self._spread, self._slowest, self._fastest,
-                        self._bias_s)
+                        self._lasting_s)
         return out
 
     def advance(self, state: Array, dt_s: float) -> Array:
-        """The mean of `state` after `dt_s`, without a null-space reset; its paint biases may be left out."""
+        """The mean of `state` after `dt_s`, without a null-space reset; its errors that last may be left out."""
         after = state.copy()
         if dt_s > 0.0:
             _transition(after, np.empty((self.size, 0)), dt_s, self.mean, self._information, self._spread,
-                        self._slowest, self._fastest, self._bias_s)
+                        self._slowest, self._fastest, self._lasting_s)
         return after
 
     def process_noise_sd(self, state: Array, dt_s: float) -> Array:
@@ -167,7 +168,7 @@ def _rates(state, information, spread, slowest, fastest, out):
 
 
 @njit(cache=True)
-def _predict(state, covariance, dt, mean, pose_covariance, information, spread, slowest, fastest, bias, bias_s):
+def _predict(state, covariance, dt, mean, pose_covariance, information, spread, slowest, fastest, lasting, lasting_s):
     blocks, turn, noise, rate = np.empty((3, 3, 3)), np.empty((3, 3)), np.empty((3, 3, 3)), np.empty(3)
     left = dt
     while left > 0.0:
@@ -189,11 +190,11 @@ def _predict(state, covariance, dt, mean, pose_covariance, information, spread, 
                 for i in range(_COUNT):
                     for j in range(_COUNT):
                         covariance[POSE * a + 6 + i, POSE * b + 6 + j] += noise[2, a, b] * pose_covariance[i, j]
-    _decay_bias(state, covariance, np.repeat(np.exp(-dt / bias_s), 3), bias)
+    _decay_lasting(state, covariance, np.repeat(np.exp(-dt / lasting_s), 3), lasting)
 
 
 @njit(cache=True)
-def _transition(state, out, dt, mean, information, spread, slowest, fastest, bias_s):
+def _transition(state, out, dt, mean, information, spread, slowest, fastest, lasting_s):
     """Move `state` by `dt` s, and multiply `out` (n, C) by the transition from the left; C may be 0."""
     blocks, turn, rate = np.empty((3, 3, 3)), np.empty((3, 3)), np.empty(3)
     left = dt
@@ -203,8 +204,8 @@ def _transition(state, out, dt, mean, information, spread, slowest, fastest, bia
         left -= step if left - step > 1e-9 else left
         _propagate(state, mean, rate, step, blocks, turn)
         _apply(blocks, turn, out)
-    for i in range(3 * bias_s.shape[0]):
-        out[MOTION + i] *= math.exp(-dt / bias_s[i // 3])
+    for i in range(3 * lasting_s.shape[0]):
+        out[MOTION + i] *= math.exp(-dt / lasting_s[i // 3])
 
 
 @njit(cache=True)
@@ -256,17 +257,17 @@ def _transpose(matrix):
 
 
 @njit(cache=True)
-def _decay_bias(state, covariance, decay, bias):
+def _decay_lasting(state, covariance, decay, lasting):
     size = covariance.shape[0]
     state[STATE.lasting] *= decay
     for i in range(MOTION, size):
         for j in range(size):
             covariance[i, j] *= decay[i - MOTION]
             covariance[j, i] *= decay[i - MOTION]
-    for m in range(bias.shape[0]):
+    for m in range(lasting.shape[0]):
         for i in range(3):
             for j in range(3):
-                covariance[MOTION + 3 * m + i, MOTION + 3 * m + j] += (1.0 - decay[3 * m]**2) * bias[m, i, j]
+                covariance[MOTION + 3 * m + i, MOTION + 3 * m + j] += (1.0 - decay[3 * m]**2) * lasting[m, i, j]
 
 
 @njit(cache=True)

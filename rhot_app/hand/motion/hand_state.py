@@ -22,8 +22,8 @@ class HandParts(NamedTuple):
 
     `palm`: world_from_palm, m and rad along the world's axes. `angles` (21,) rad. `pose`: both. `velocity` and
     `acceleration` (27,). `motion`: all of these. `lasting`: everything after them. In a bare hand's state that is the
-    `shape` (36,), then the `biases` of M markers, m along the world's axes. The state of a hand without a shape has the
-    biases alone, in `lasting`; `shape` and `biases` are not for it.
+    `shape` (36,), then the `biases`: of M markers, m along the world's axes, and the cameras' turns, rad. The state of
+    a hand without a shape has the biases alone, in `lasting`; `shape` and `biases` are not for it.
     """
 
     palm: slice

@@ -91,7 +91,7 @@ class MarkersOfHand:
     def _set_lasting_errors(self, state: Array) -> None:
         """Set the process's covariance of the lasting errors to that of the markers of a hand in `state`."""
         bias = lasting_covariances(without_shape(state), sized(self._markers, self._hand.surface.bone, state).arrays)
-        self._process.set_bias(np.concatenate([self._shape, bias]))
+        self._process.set_lasting(np.concatenate([self._shape, bias]))
 
 
 class SizedMarkerResidual:

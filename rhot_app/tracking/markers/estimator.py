@@ -47,6 +47,11 @@ Indices = NDArray[np.int64]
 REJECTIONS = 2
 """Observations rejected in a row that are no outliers: of one in ten mistaken, two in a row have a chance of 1 %."""
 
+KNOCKED, KNOCK_MOST = 3, 100.0
+"""Markers that a camera rejects so at once, half or more of those that it sees: it has been knocked. Two may be fingers
+that bend faster than expected, or things of their colours. And the variance of the cameras' turns, over that which
+calibrations have, up to which it grows with every such frame: knocks of some ten milliradians (half a degree)."""
+
 _PENDING = 16
 
 
@@ -208,7 +213,7 @@ class Estimator(Tracker):
                 self._size.look(located, pose.world_from_palm, pose.angles)
             self._resize(*self._size.known)
         state, _ = self._process.start(pose.world_from_palm, pose.angles, START_SD)
-        self._process.set_bias(lasting_covariances(state, self._markers.arrays))
+        self._process.set_lasting(lasting_covariances(state, self._markers.arrays))
         self._filter.begin(t_ns, *self._process.start(pose.world_from_palm, pose.angles, START_SD))
         self._life.begin(t_ns)
         for frame in self._observations.recent(t_ns):
@@ -237,7 +242,7 @@ class Estimator(Tracker):
         pixels, covariances = frame.predict_pixels(*prediction)
         distances = frame.distances(pixels, covariances)
         frame = frame.associated(pixels, covariances, distances)
-        self._process.set_bias(lasting_covariances(prediction[0], self._markers.arrays))
+        self._process.set_lasting(lasting_covariances(prediction[0], self._markers.arrays))
         try:
             knot = self._filter.add(t_s, [frame] if self._plane is None else [frame, self._plane], prediction)
         except np.linalg.LinAlgError:  # the estimate contradicts itself
@@ -253,9 +258,10 @@ class Estimator(Tracker):
             inflated = self._filter.newest.covariance.copy()
             for part, factor in wrong:
                 self._process.inflate(inflated, part, factor)
-            if 2 * len(wrong) >= candidates:  # a camera that contradicts most of the hand may have been knocked
-                turns = slice(MOTION + 3 * len(frame.seen), None)
-                inflated[turns, turns] += self._process.stationary[turns, turns]
+            turns = slice(MOTION + 3 * len(frame.seen), None)
+            own, more = inflated[turns, turns], self._process.stationary[turns, turns]
+            if len(wrong) >= KNOCKED and 2 * len(wrong) >= candidates and np.trace(own) < KNOCK_MOST * np.trace(more):
+                own += more
             self._filter.restart(inflated)
         accepted = int(np.count_nonzero(inliers))
         self._life.observe(frame.t_ns, accepted=accepted > 0, plausible=bool(2 * accepted >= candidates))

@@ -37,7 +37,7 @@ LASTING_PX = 0.01
 """px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/marker_errors.py`)."""
 
 TURN_SD_RAD, TURN_S = 1e-3, 3600.0
-"""rad, s: by how much a camera may be turned against the first one, beside what its calibration says: half a pixel of a
+"""rad, s: by how much a camera may be turned against the reference, beside what its calibration says: half a pixel of a
 lens of 530 px; and how long that lasts. If cameras are believed exactly, a hand at rest follows now the one, now
 the other, and shakes (`python benchmarks/trackers.py --only turned`)."""
 
@@ -66,6 +66,7 @@ class MarkerArrays(NamedTuple):
     landmark: NDArray[np.bool_]
     poses: Array
     intrinsics: Array
+    reference: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,8 @@ class MarkerModel:
     over that from its end, less 1; negative where the size says nothing of the distance. `paint_variance` (M,) m^2.
     `landmark` (M,) bool: landmarks, which err as `hand.landmarks` says.
     `size_sd`: of the logarithm of the hand's size before anything of it is seen.
-    `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 13) as `CameraModel`. `limits` (21, 2) rad.
+    `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 13) as `CameraModel`. `reference`: the first camera that is
+    tracked with, against which the others may be turned. `limits` (21, 2) rad.
     """
 
     model: HandModel
@@ -94,19 +96,19 @@ class MarkerModel:
     roles: tuple[str, ...]
     places: tuple[Place, ...]
     size_sd: float
+    reference: int
 
     @property
     def arrays(self) -> MarkerArrays:
         """What compiled functions take of it."""
         return MarkerArrays(self.dh, self.half_axes, self.slender, self.paint_variance, self.landmark, self.poses,
-                            self.intrinsics)
-
+                                            self.intrinsics, self.reference)
     def scaled(self, factor: float) -> MarkerModel:
         """The markers on a hand `factor` times as large."""
         return replace(self, dh=scaled_table(self.dh, factor))
 
     def process(self) -> HandProcess:
-        """How the hand moves, with the rates of recorded hands; paint biases are 0 until `set_bias`."""
+        """How the hand moves, with the rates of recorded hands; paint biases are 0 until `set_lasting`."""
         covariance = np.asarray(np.linalg.inv(self.pose_prior.information), dtype=np.float64)
         return HandProcess(self.dh, self.limits, self.pose_prior.mean, covariance, PALM_SPREAD, SLOWEST, FASTEST,
                            np.zeros((len(self.lasting_s), 3, 3)), self.lasting_s)
@@ -142,7 +144,7 @@ def compile_markers(rig: Rig) -> MarkerModel:
         np.array([camera.intrinsics for camera in cameras]),
         pose_prior_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places,
-        USUAL_SIZE_SD if is_shipped(rig.hand) else LEAST_SIZE_SD)
+        USUAL_SIZE_SD if is_shipped(rig.hand) else LEAST_SIZE_SD, rig.tracked_with.index(True))
 
 
 def scaled_table(dh: DhArrays, factor: float) -> DhArrays:

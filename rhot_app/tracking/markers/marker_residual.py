@@ -1,7 +1,7 @@
 """Residuals of a hand: marker centroids and apparent sizes in one camera's frame.
 
 After the motion, a state has the errors that last: a displacement of each of M markers, m along the world's axes, and a
-turn of each of C cameras but the first, rad about its own axes.
+turn of each of C cameras but the reference, the first one that is tracked with, rad about its own axes.
 """
 
 from __future__ import annotations
@@ -163,12 +163,18 @@ def place_points(state, dh):
 
 
 @njit(cache=True)
+def turn_of(camera, reference):
+    """Which of a state's turns is this camera's; the reference has none."""
+    return camera - 1 if camera > reference else camera
+
+
+@njit(cache=True)
 def turned_camera(state, markers, camera):
     """camera_from_world (3, 4) of a camera with its turn in `state` about its own axes, rad, and the turn's left
-    Jacobian (3, 3); the first camera has none."""
+    Jacobian (3, 3)."""
     turn, rotation, left = np.zeros(3), np.empty((3, 3)), np.empty((3, 3))
-    if camera > 0:
-        first = 3 * (markers.half_axes.shape[0] + camera - 1)
+    if camera != markers.reference:
+        first = 3 * (markers.half_axes.shape[0] + turn_of(camera, markers.reference))
         turn[:] = state[STATE.lasting][first:first + 3]
     exponential(turn[0], turn[1], turn[2], rotation, left)
     return np.dot(rotation, markers.poses[camera]), left
@@ -197,7 +203,8 @@ def project_markers(state, markers, camera, late_s):
     jacobian = np.zeros((count, 2, MOTION + 3 * (count + cameras - 1)))
     world, _, points, by_pose = place_points(state, markers.dh)
     (pose, left), intrinsics, centre = turned_camera(state, markers, camera), markers.intrinsics[camera], np.empty(3)
-    own, axis, ray, turning = MOTION + 3 * (count + camera - 1), np.empty(3), np.empty(3), np.empty(3)
+    own, axis, ray, turning = (MOTION + 3 * (count + turn_of(camera, markers.reference)), np.empty(3), np.empty(3),
+                               np.empty(3))
     slope, at_joint, joint_pixel = np.empty((2, 3)), np.empty((2, 3)), np.empty(2)
     for m in range(late_s.shape[0]):
         late = late_s[m]
@@ -218,7 +225,7 @@ def project_markers(state, markers, camera, late_s):
                 jacobian[m, r, 2 * POSE + j] = 0.5 * late * late * along
             for k in range(3):
                 jacobian[m, r, MOTION + 3 * m + k] = slope[r, k]
-            if camera == 0 or markers.landmark[m]:  # landmarks' errors last, and would turn the cameras
+            if camera == markers.reference or markers.landmark[m]:  # landmarks' errors last, and would turn the cameras
                 continue
             for k in range(3):
                 axis[k] = pose[k, 0] * slope[r, 0] + pose[k, 1] * slope[r, 1] + pose[k, 2] * slope[r, 2]
@@ -346,7 +353,7 @@ def _size_change(point, pose, intrinsics, line, distance, change):
 @njit(cache=True)
 def lasting_covariances(state, markers):
     """(M + C - 1, 3, 3) of the errors that last: of a marker's triangulated centre, m^2, by the cameras' LASTING_PX and
-    by its paint; then of the turns of all cameras but the first, rad^2."""
+    by its paint; then of the turns of all cameras but the reference, rad^2."""
     dh, world, count, cameras = markers.dh, pose_matrix(state), markers.half_axes.shape[0], markers.poses.shape[0]
     points, pixel, slope = np.empty((count, 3)), np.empty(2), np.empty((2, 3))
     out = np.zeros((count + cameras - 1, 3, 3))
@@ -362,10 +369,17 @@ def lasting_covariances(state, markers):
         out[m] = np.linalg.inv(information)
         for i in range(3):
             out[m, i, i] += markers.paint_variance[m]
-    first, hand, across = -np.dot(markers.poses[0, :, :3].T, markers.poses[0, :, 3]), world[:3, 3], np.empty(3)
-    for camera in range(1, cameras):
-        pose, own = markers.poses[camera], out[count + camera - 1]
-        fill_cross(np.dot(pose[:, :3], first) + pose[:, 3], np.dot(pose[:, :3], hand) + pose[:, 3], across)
+    reference, hand, origin, across = markers.poses[markers.reference], np.empty(3), np.empty(3), np.empty(3)
+    for camera in range(cameras):
+        if camera == markers.reference:
+            continue
+        pose, own = markers.poses[camera], out[count + turn_of(camera, markers.reference)]
+        hand[0], hand[1], hand[2] = camera_coordinates(pose, world[0, 3], world[1, 3], world[2, 3])
+        for i in range(3):  # the reference camera's place
+            across[i] = -(reference[0, i] * reference[0, 3] + reference[1, i] * reference[1, 3]
+                          + reference[2, i] * reference[2, 3])
+        origin[0], origin[1], origin[2] = camera_coordinates(pose, across[0], across[1], across[2])
+        fill_cross(origin, hand, across)
         across /= max(math.sqrt(np.dot(across, across)), 1e-12)
         for i in range(3):
             own[i, i] = TURN_SD_RAD**2
