@@ -4696,6 +4696,42 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Finger, die sich in den Bildern kreuzen: Zeige- und Mittelfinger, Klein- und Ringfinger, der Daumen über der Handfläche, die Hand hochkant.</translation>
     </message>
     <message>
+        <source>Index</source>
+        <translation>Zeigefinger</translation>
+    </message>
+    <message>
+        <source>Middle</source>
+        <translation>Mittelfinger</translation>
+    </message>
+    <message>
+        <source>Ring</source>
+        <translation>Ringfinger</translation>
+    </message>
+    <message>
+        <source>Little</source>
+        <translation>Kleiner Finger</translation>
+    </message>
+    <message>
+        <source>Forearm</source>
+        <translation>Unterarm</translation>
+    </message>
+    <message>
+        <source>Sizes</source>
+        <translation>Größen</translation>
+    </message>
+    <message>
+        <source>Lengths</source>
+        <translation>Längen</translation>
+    </message>
+    <message>
+        <source>Radii</source>
+        <translation>Radien</translation>
+    </message>
+    <message>
+        <source>Finger roots</source>
+        <translation>Fingerwurzeln</translation>
+    </message>
+    <message>
         <source>Hold still</source>
         <translation>Still halten</translation>
     </message>

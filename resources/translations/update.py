@@ -1,7 +1,7 @@
 """Renew the translations: ``python resources/translations/update.py [--new CODE]``.
 
-`pyside6-lupdate` collects the sentences of `rhot_app/ui`, the engine's advice, and the titles of calibrations and
-motions into a file for each language, such as `rhot_de.ts`. A translator fills it as text or with Qt Linguist.
+`pyside6-lupdate` collects the sentences of `rhot_app/ui`, the engine's advice, and names that the window shows
+into a file for each language, such as `rhot_de.ts`. A translator fills it as text or with Qt Linguist.
 `pyside6-lrelease` makes the file that the app loads of it, such as `rhot_de.qm`.
 """
 
@@ -18,20 +18,21 @@ HERE = Path(__file__).parent
 SOURCES = [HERE.parents[1] / "rhot_app" / name for name in ("ui", "engine")]
 
 
-def of_other_rooms() -> list[str]:
-    """What records of other rooms are called, which the window shows and translates: calibrations, motions."""
+def shown_names() -> list[str]:
+    """Names of `rhot_app` outside of `ui` that the window translates: calibrations, motions, a hand's numbers."""
     from rhot_app.calibration.registry import calibrations
+    from rhot_app.handfit.quantities import GROUPS
     from rhot_app.ui.models.words import shipped_motions
 
     return [*(text for wizard in calibrations() for text in (wizard.title, wizard.meaning)),
-            *(text for motion in shipped_motions() for text in (motion.name, motion.description))]
+            *(text for motion in shipped_motions() for text in (motion.name, motion.description)), *GROUPS]
 
 
 def collect(path: Path) -> None:
     """Bring the sentences of a .ts file up to date; translations stay, those of no sentence go."""
     with tempfile.TemporaryDirectory() as folder:
         records = Path(folder, "records.py")
-        records.write_text("".join(f"tr_noop({json.dumps(text, ensure_ascii=False)})\n" for text in of_other_rooms()))
+        records.write_text("".join(f"tr_noop({json.dumps(text, ensure_ascii=False)})\n" for text in shown_names()))
         _run("lupdate", "-silent", "-no-obsolete", "-locations", "none", "-tr-function-alias",
              "QT_TR_NOOP+=tr_noop,QT_TR_NOOP+=words,tr+=advise", "-source-language", "en", "-target-language",
              path.stem.partition("_")[2],

@@ -28,7 +28,8 @@ from rhot_app.handfit.state import BEND_LIMIT, FitState
 Array = NDArray[np.float64]
 Kind = Literal["place", "turn", "angle", "bend", "size", "length", "radius", "root"]
 
-GROUPS: tuple[str, ...] = ("Palm", *(name.capitalize() for name in FINGERS), "Forearm", "Sizes", "Lengths",
+PALM = "Palm"
+GROUPS: tuple[str, ...] = (PALM, *(name.capitalize() for name in FINGERS), "Forearm", "Sizes", "Lengths",
                            "Radii", "Finger roots")
 """In the order of the screen. Those of the pose come first."""
 
@@ -58,9 +59,9 @@ class Number:
 
 def numbers_of(base: HandAnatomy) -> tuple[Number, ...]:
     """All numbers of a fit that begins with the hand `base`."""
-    found = [Number("Palm", name, "mm", -NEAR_MM, NEAR_MM, "place", k, "Of the wrist in the rig's frame.")
+    found = [Number(PALM, name, "mm", -NEAR_MM, NEAR_MM, "place", k, "Of the wrist in the rig's frame.")
              for k, name in enumerate(("x", "y", "z"))]
-    found += [Number("Palm", name, "°", -low, low, "turn", k, "The palm turns about its axes, z first, then y, then x.")
+    found += [Number(PALM, name, "°", -low, low, "turn", k, "The palm turns about its axes, z first, then y, then x.")
               for k, (name, low) in enumerate((("turn about z", 180.0), ("turn about y", 90.0),
                                                ("turn about x", 180.0)))]
     for finger, own in zip(FINGERS, ANGLE_SLICES, strict=True):

@@ -6,11 +6,11 @@ import gc
 import subprocess
 import sys
 import threading
-import time
 import weakref
 
 import pytest
 import shiboken6
+from patience import eventually
 from PySide6.QtCore import QObject
 
 from rhot_app.errors import RigError
@@ -120,15 +120,16 @@ def test_a_callback_that_fails_does_not_stop_the_next_job(qtbot, heard, qapp):
 
 
 def test_work_whose_parent_ends_is_asked_to_stop(qtbot, heard):
-    stopped = threading.Event()
+    begun, stopped = threading.Event(), threading.Event()
 
     def op(progress):
-        while not progress.cancelled:
-            time.sleep(0.005)
+        begun.set()
+        eventually(lambda: progress.cancelled)
         stopped.set()
 
     window = QObject()
     job = Job(op, heard.append, heard.append, None, window).start()
+    assert begun.wait(10.0)
     shiboken6.delete(window)
     assert job.wait(10.0) and stopped.is_set()
     qtbot.wait(50)
@@ -145,9 +146,7 @@ def test_a_thousand_jobs_leave_nothing_with_their_parent(qtbot):
 
 def test_the_end_of_the_app_cancels_and_waits(qtbot, heard):
     def op(progress):
-        while True:
-            progress.report("on", 0.5)
-            time.sleep(0.005)
+        eventually(lambda: progress.report("on", 0.5))  # until that raises
 
     Job(op, heard.append, heard.append).start()
     assert end_jobs(10.0) == []
@@ -195,6 +194,33 @@ raise SystemExit(leave(5, 0.2))
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (5, "closing\n")
     assert "still at work when the app ended: never" in ended.stderr
+
+
+def test_work_that_outlives_its_window_does_not_keep_the_app_either():
+    program = ALONE + """
+import shiboken6
+from PySide6.QtCore import QObject
+begun, window = threading.Event(), QObject()
+def slow(progress):
+    begun.set()
+    time.sleep(20.0)
+job = Job(slow, print, print, None, window).start()
+begun.wait()
+shiboken6.delete(window)
+raise SystemExit(leave(5, 0.2))
+"""
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (5, "")
+    assert "still at work when the app ended: slow" in ended.stderr
+
+
+def test_the_end_of_abandoned_work_comes_after_its_window(qtbot):
+    may_end, window = threading.Event(), QObject()
+    job = Job(lambda progress: may_end.wait(60.0), print, print, None, window).start()
+    shiboken6.delete(window)
+    assert Job.under_way() == [job]
+    may_end.set()
+    qtbot.waitUntil(lambda: not Job.under_way())
 
 
 def test_a_job_whose_parent_is_deleted_holds_nothing(qtbot):

@@ -42,7 +42,7 @@ def workers() -> QThreadPool:
 
 def end_jobs(timeout_s: float) -> list[str]:
     """Cancel everything under way and wait for it, at most `timeout_s` in all; what has not ended, by its work's name.
-    Nothing is heard of any of it."""
+    None of it calls `done` or `failed` any more."""
     jobs = Job.under_way()
     for job in jobs:
         job.cancel()
@@ -95,7 +95,7 @@ class Job:
     error that is not one of ours is shown as a sentence too, with its kind, and logged whole.
     """
 
-    _jobs: ClassVar[dict[int, Job]] = {}  # a job lives until its last word has been heard
+    _jobs: ClassVar[dict[int, Job]] = {}  # until its end has come to the window's thread
     _numbers = itertools.count()
 
     def __init__(self, op: Callable[[Progress], Any], done: Callable[[Any], None], failed: Callable[[str], None],
@@ -177,10 +177,12 @@ def _post() -> _Post:
 
 
 def _abandon(number: int, _deleted: QObject | None = None) -> None:
-    """The owner has ended: nothing of it is kept, and `op` is asked to stop."""
-    job = Job._jobs.pop(number, None)
+    """The owner has ended: its callbacks are kept no longer, and `op` is asked to stop. The job stays under way until
+    its end has come, so that `end_jobs` waits for it."""
+    job = Job._jobs.get(number)
     if job is not None:
         job.cancel()
+        job._guard = None  # was deleted with the owner
         job._done = job._failed = job._show = _nothing
 
 

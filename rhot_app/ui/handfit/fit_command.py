@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     warm_up(rig)
     from PySide6.QtWidgets import QApplication
 
-    from rhot_app.ui.app import choose_gl_platform
+    from rhot_app.ui.app import choose_gl_platform, leave
     from rhot_app.ui.common.settings import Settings
     from rhot_app.ui.common.theme import apply_theme, scheme_named
     from rhot_app.ui.handfit.frame import Kept
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     window.show()
     app.exec()
     settings.sync()
-    return 0
+    return leave(0)
 
 
 def _require_screen() -> None:

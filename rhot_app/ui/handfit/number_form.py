@@ -55,8 +55,8 @@ class NumberRow(QWidget):
                                   "hands; after Fit to contours by the contours, too."))
         for part in (name, self.box, self.slider):
             part.setToolTip(number.meaning)
-        self.box.setAccessibleName(f"{number.group}, {number.name}")
-        self.slider.setAccessibleName(tr("{group}, {name}, slider", group=number.group, name=number.name))
+        self.box.setAccessibleName(f"{tr(number.group)}, {number.name}")
+        self.slider.setAccessibleName(tr("{group}, {name}, slider", group=tr(number.group), name=number.name))
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(0)
@@ -106,7 +106,8 @@ class NumberForm(QWidget):
         self.group_box = QComboBox()
         self.group_box.setToolTip(tr("Which numbers the sliders below move."))
         self.group_box.setAccessibleName(tr("Numbers"))
-        self.group_box.addItems(list(GROUPS))
+        for group in GROUPS:
+            self.group_box.addItem(tr(group), group)
         self.pages = QStackedWidget()
         for group in GROUPS:
             self.pages.addWidget(self._page([number for number in numbers if number.group == group]))
@@ -120,11 +121,11 @@ class NumberForm(QWidget):
     @property
     def group(self) -> str:
         """The group shown."""
-        return self.group_box.currentText()
+        return str(self.group_box.currentData())
 
     def show_group(self, group: str) -> None:
         """Show another group."""
-        self.group_box.setCurrentText(group)
+        self.group_box.setCurrentIndex(self.group_box.findData(group))
 
     def fill(self, value: Callable[[Number], float], sd: Callable[[Number], float]) -> None:
         """Show the newest values of the group that is shown."""

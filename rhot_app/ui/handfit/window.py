@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import JOINTS
-from rhot_app.handfit.quantities import Number
+from rhot_app.handfit.quantities import PALM, Number
 from rhot_app.handfit.session import HandFit
 from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.handfit.changes import Changes
@@ -122,7 +122,7 @@ class HandFitWindow(ToolWindow):
         for view in self.frame.views:
             view.choose(joint)
         if self.frame.form.group_box.currentIndex() <= len(JOINTS) // 4:
-            self.frame.form.show_group(JOINTS[joint].split("_")[0].capitalize() if joint else tr("Palm"))
+            self.frame.form.show_group(JOINTS[joint].split("_")[0].capitalize() if joint else PALM)
 
     def _choose_freedom(self) -> None:
         self.fit.freedom = self.frame.freedom_box.currentData()

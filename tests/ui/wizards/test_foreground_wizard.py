@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from fake_engine import synthetic_rig
 from patience import PATIENCE_S, eventually, settled
-from rhot_app.ui.wizards.steps import foreground_steps
 from wizard_rig import FakeRigAsker
 
 from rhot_app.errors import EngineError
 from rhot_app.ui.models.proposal import restore_all, use_all
+from rhot_app.ui.wizards import foreground
 from rhot_app.ui.wizards.foreground import EmptyStep, SceneWatch, SkinStep, findings_of, mask_of, propose
 from rhot_node.foreground_store import ForegroundStore
 from rhot_node.network.pictures import PictureBox, encode_still
@@ -74,7 +74,7 @@ class LearningNodes(FakeRigAsker):
 
 @pytest.fixture
 def nodes(tmp_path, monkeypatch):
-    monkeypatch.setattr(foreground_steps, "SECONDS", 0.1)
+    monkeypatch.setattr(foreground, "SECONDS", 0.1)
     return LearningNodes(tmp_path)
 
 
@@ -154,7 +154,7 @@ def test_closing_while_the_scene_is_learnt_keeps_the_old_one(hands, nodes, monke
     eventually(lambda: not old.learning)
     before = old.current.mean.copy()
     nodes.hand = True  # so that the scene is another one
-    monkeypatch.setattr(foreground_steps, "SECONDS", 0.4)
+    monkeypatch.setattr(foreground, "SECONDS", 0.4)
     hands.click(hands.window.page.learn_button)
     hands.until(lambda: old.learning)
     hands.window.end().wait(PATIENCE_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import cv2
@@ -26,11 +27,13 @@ from rhot_app.handfit.hand_shape import ROOTS
 from rhot_app.handfit.session import HandFit
 from rhot_app.project import load_rig, save_rig
 from rhot_app.rig_history import versions
+from rhot_app.ui import app
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.handfit.frame import Kept
 from rhot_app.ui.handfit.instants import TITLE
 from rhot_app.ui.handfit.live import fit_live
 from rhot_app.ui.handfit.window import HandFitWindow
+from rhot_app.ui.language import use_language
 from rhot_app.ui.models.palette import DARK, LIGHT
 
 INDEX_TIP, WRIST = JOINTS.index("index_tip"), JOINTS.index("wrist")
@@ -192,6 +195,16 @@ def test_a_click_on_a_joint_shows_the_numbers_of_its_finger(person):
     one.frame.form.show_group("Lengths")
     one.drag_joint(0, JOINTS.index("thumb_tip"), 1, 1)
     assert one.frame.form.group == "Lengths", "a group of the shape stays"
+
+
+def test_a_click_on_the_wrist_shows_the_palm_in_every_language(person):
+    use_language("de")
+    one = person()
+    one.frame.form.show_group("Thumb")
+    QTest.mouseClick(one.frame.views[0], Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, one.at(0, WRIST))
+    assert one.frame.form.group == "Palm" and one.frame.form.group_box.currentText() == "Handfläche"
+    assert one.frame.form.group_box.itemText(len(FINGERS)) == "Kleiner Finger"
+    use_language("en")
 
 
 def test_the_wheel_zooms_about_the_pointer_and_a_double_click_shows_all(person):
@@ -430,6 +443,22 @@ def test_command_refusals_are_sentences_before_a_window_opens(tmp_path, capsys, 
         monkeypatch.delenv(name, raising=False)
     assert main(good) == 2 and "no screen here" in capsys.readouterr().err
     assert sorted(path.name for path in Path(tmp_path).glob("*.json")) == ["bare.json", "rig.json"]
+
+
+def test_the_command_ends_the_work_under_way_as_the_app_does(themed, tmp_path, monkeypatch):
+    from rhot_app.__main__ import main
+
+    rig, _, images = drawn()
+    save_rig(tmp_path / "rig.json", rig)
+    cv2.imwrite(str(tmp_path / "left.png"), images[0][:, :, ::-1])
+    ended = []
+    monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr(QApplication, "exec", lambda *_: 0)
+    monkeypatch.setattr(app, "leave", lambda code: ended.append(code) or code)
+    assert main(["fit-hand", "--rig", str(tmp_path / "rig.json"), "--pictures", str(tmp_path / "left.png"),
+                 "--settings", str(tmp_path / "app.ini")]) == 0
+    assert ended == [0]
 
 
 # -- on a rig whose cameras run ----------------------------------------------------------------------------------------
