@@ -3641,7 +3641,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>own: 21 joints</source>
-        <translation>eigener: 21 Gelenke</translation>
+        <translation>own: 21 Gelenke</translation>
     </message>
     <message>
         <source>Wrist, then four joints of each finger; positions in the rig frame.</source>
@@ -5168,8 +5168,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Knoten {name}: Seine Uhr ist nur auf ±{bound:.1f} ms bekannt, daher verschwimmen schnelle Bewegungen. {remedy}</translation>
     </message>
     <message>
-        <source> The distance is a guess, by the hand&apos;s size and an assumed lens (60 degrees).</source>
-        <translation> Der Abstand ist geraten, aus der Größe der Hand und einem angenommenen Objektiv (60 Grad).</translation>
+        <source> The distance is a guess, by the hand&apos;s size and an assumed lens ({degrees} degrees).</source>
+        <translation> Der Abstand ist geraten, aus der Größe der Hand und einem angenommenen Objektiv ({degrees} Grad).</translation>
     </message>
     <message>
         <source> The distance is a guess, by the hand&apos;s size.</source>

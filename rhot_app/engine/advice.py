@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rhot_app.calibration.check.camera_calibration import NOT_CALIBRATED, calibration_finding, times_unknown
 from rhot_app.engine.node_meter import RECENT_NS, Recent
 from rhot_app.engine.status import Advice, Level, NodeStatus, advise, words
-from rhot_app.project import Rig
+from rhot_app.project import Intrinsics, Rig
 from rhot_app.state import HandState
 from rhot_node.network.presence import is_loopback
 
@@ -268,8 +268,7 @@ def times_advice(rig: Rig, rates_hz: Sequence[float]) -> list[Advice]:
     most = f" ({500.0 / min(rates):.0f} ms)" if rates else ""
     return [advise("The times of {names} against {first} are not known: cameras that are not synchronised may be up to "
                    "half a frame apart{most}. Calibrate the times with a waving hand.", level="info", mender="time",
-                   lasting=True, subject="calibration", names=" and ".join(unknown), first=rig.nodes[0].name,
-                   most=most)]
+                   lasting=True, subject="calibration", names=", ".join(unknown), first=rig.nodes[0].name, most=most)]
 
 
 def one_camera_advice(rig: Rig) -> list[Advice]:
@@ -278,7 +277,7 @@ def one_camera_advice(rig: Rig) -> list[Advice]:
     apart = [node.name for node in rig.nodes if node not in used]
     if len(used) > 1 and not apart:
         return []
-    names, by = " and ".join(apart), " and ".join(node.name for node in used)
+    names, by = ", ".join(apart), ", ".join(node.name for node in used)
     mender = "stereo" if apart else ""
     if len(used) == 1 and rig.painted and rig.tracker.observe == "markers" and rig.tracker.palm_plane is None:
         if apart:
@@ -288,17 +287,20 @@ def one_camera_advice(rig: Rig) -> list[Advice]:
         return [advise("{by} alone does not find a hand by painted markers. Add a second camera, or track a bare hand.",
                        level="info", mender=mender, lasting=True, subject="calibration", by=by)]
     guess = ""
-    if len(used) == 1:  # the lens of `Intrinsics.ASSUMED_DEG`
-        guess = (words(" The distance is a guess, by the hand's size and an assumed lens (60 degrees).")
+    if len(used) == 1:
+        guess = (words(" The distance is a guess, by the hand's size and an assumed lens ({degrees} degrees).")
                  if used[0].intrinsics.nominal else words(" The distance is a guess, by the hand's size."))
+    degrees = round(Intrinsics.ASSUMED_DEG)
     if not apart:
         return [advise("{by} alone tracks the hand.{guess}", level="info", mender=mender, lasting=True,
-                       subject="calibration", by=by, guess=guess)]
+                       subject="calibration", by=by, guess=guess, degrees=degrees)]
     if len(apart) == 1:
         return [advise("{by} alone tracks the hand until {names} is put together with it.{guess}", level="info",
-                       mender=mender, lasting=True, subject="calibration", by=by, names=names, guess=guess)]
+                       mender=mender, lasting=True, subject="calibration", by=by, names=names, guess=guess,
+                       degrees=degrees)]
     return [advise("{by} alone tracks the hand until {names} are put together with it.{guess}", level="info",
-                   mender=mender, lasting=True, subject="calibration", by=by, names=names, guess=guess)]
+                   mender=mender, lasting=True, subject="calibration", by=by, names=names, guess=guess,
+                   degrees=degrees)]
 
 
 def _visibility_advice(facts: NodeFacts, marker_ids: Sequence[str]) -> list[Advice]:

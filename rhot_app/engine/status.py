@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, TypeVar, get_args
 
@@ -65,12 +65,23 @@ def advise(pattern: str, /, *, level: Level = "warning", mender: str = "", lasti
            subject: Subject = "equipment", **values: str | int | float) -> Advice:
     """A sentence: a literal with named placeholders, as `str.format` has them, and their `values`. Words among these
     are marked by `words`."""
-    return Advice(level, pattern.format(**values), mender, lasting, subject, pattern, values)
+    text = pattern.format(**{name: with_numbers(value, values) for name, value in values.items()})
+    return Advice(level, text, mender, lasting, subject, pattern, values)
 
 
 def words(text: str) -> str:
-    """Mark a literal that is a value of `advise`, so that it is translated, too."""
+    """Mark a literal that is a value of `advise`, so that it is translated, too. It may have placeholders of its own
+    for numbers among the values: `with_numbers`."""
     return text
+
+
+def with_numbers(value: str | float, values: Mapping[str, str | float]) -> str | float:
+    """`value` with the numbers among `values` for its placeholders, whose names alone stand in braces."""
+    if isinstance(value, str):
+        for name, number in values.items():
+            if not isinstance(number, str):
+                value = value.replace(f"{{{name}}}", str(number))
+    return value
 
 
 class _Ranked(Protocol):

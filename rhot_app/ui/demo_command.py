@@ -47,6 +47,5 @@ def _choice(args: argparse.Namespace, motion: str | None) -> TwinChoice:
     fields = read_scene(args.scene)
     if motion is not None:
         fields.set("show.motion", motion, f"--motion {motion}")
-    fields.scene()
-    fields.shown()
+    fields.require()
     return TwinChoice(motion, args.seed, None, args.tracker, args.scene.absolute())

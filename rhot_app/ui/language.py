@@ -90,5 +90,6 @@ def use_language(choice: str) -> None:
                  QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath) + f"/qtbase_{name}.qm"):
         translator = QTranslator()
         if name != "en" and translator.load(str(file)):
-            QCoreApplication.installTranslator(translator)
+            if QCoreApplication.instance() is not None:
+                QCoreApplication.installTranslator(translator)
             _translators.append(translator)

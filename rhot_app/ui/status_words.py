@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from rhot_app.calibration.registry import find_calibration
-from rhot_app.engine.status import Advice, EngineStatus
+from rhot_app.engine.status import Advice, EngineStatus, with_numbers
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
 from rhot_app.ui.backend.contract import Asker, TwinPace
@@ -83,8 +83,9 @@ def _advice_notice(advice: Advice) -> Notice:
     wizard = find_calibration(advice.mender)
     text = advice.text
     if advice.pattern:
-        text = tr(advice.pattern, **{name: tr(value) if isinstance(value, str) and " " in value else value
-                                     for name, value in advice.values.items()})  # a name is no word
+        said = {name: tr(value) if isinstance(value, str) and " " in value else value
+                for name, value in advice.values.items()}  # a name is no word
+        text = tr(advice.pattern, **{name: with_numbers(value, said) for name, value in said.items()})
     if wizard is None:
         return Notice(advice.level, text, lasting=advice.lasting, subject=advice.subject)
     action = tr("Calibrate …") if advice.lasting else f"{tr(wizard.title)} …"

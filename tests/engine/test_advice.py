@@ -183,6 +183,10 @@ def test_what_one_camera_cannot_know_is_said() -> None:
     apart = msgspec.structs.replace(rig, nodes=(left, msgspec.structs.replace(right, pose_known=False)))
     advice, = one_camera_advice(apart)
     assert "until right is put together" in advice.text and advice.mender == "stereo"
+    both = msgspec.structs.replace(apart, nodes=(*apart.nodes, msgspec.structs.replace(
+        apart.nodes[1], name="top", node_id=7)))
+    advice, = one_camera_advice(both)
+    assert advice.values["names"] == "right, top", "a value has no words that nobody translates"
     calibrated = msgspec.structs.replace(left, intrinsics=Intrinsics(640, 480, 530.0, 530.0, 318.0, 240.0))
     known, = one_camera_advice(msgspec.structs.replace(rig, nodes=(calibrated,)))
     assert "the hand's size" in known.text and "assumed" not in known.text

@@ -59,7 +59,6 @@ NOT_TRANSLATED = {
         "RHOT", "RHOT {}", "Python {}", "Qt {}", "System {}", "Screen {}", "License :: OSI Approved :: ",
         "three.js (web view)", "JSON over WebSocket", "Lab Streaming Layer",
         "AprilGrid (Kalibr)"),
-    "the process that computes speaks English": ("The program made a mistake ({}: {}). Please report it.",),
     "only its width counts": ("00:00.00 of 00:00.00",),
 }
 """Texts that stay English, by the reason."""

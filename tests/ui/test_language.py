@@ -7,17 +7,23 @@ import sys
 from datetime import datetime
 
 import pytest
+from fake_engine import synthetic_rig
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtWidgets import QDialogButtonBox, QDoubleSpinBox, QLabel
 from screen_pictures import SIZE, cut_texts
+from test_nodes_dialog import found
 from test_settings_dialog import select
 
 from resources.translations.update import release
 from rhot_app.engine.status import Advice, advise, words
 from rhot_app.state import Condition
 from rhot_app.ui import language
+from rhot_app.ui.backend.contract import Opened
 from rhot_app.ui.common.settings import Settings
+from rhot_app.ui.dialogs.found_nodes import FoundNodes
+from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.language import date_text, tr, use_language
+from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.models.words import CONDITIONS, tip
 
 MESSAGE = """<message{numerus}><source>{source}</source><comment>{comment}</comment>
@@ -155,6 +161,29 @@ def test_the_engines_advice_is_said_in_the_language_of_the_window(german, make_b
     bench.until(lambda: bench.said("Knoten left: er meldet einen Fehler; in sein Protokoll sehen."))
     assert bench.backend.engine.advice[0].text == "Node left: it reports a fault; look at its log."
     bench.until(lambda: bench.said("The cameras' rays miss each other."))
+
+
+def test_a_number_in_the_words_of_an_advice_is_said_in_german(german, make_bench):
+    bench = make_bench()
+    bench.click(bench.window.welcome.twin_button)
+    bench.until(lambda: bench.window.toolbar.badge.word == "VERFOLGT")
+    bench.backend.engine.advice = (advise(
+        "{by} alone tracks the hand.{guess}", level="error", by="left", degrees=60,
+        guess=words(" The distance is a guess, by the hand's size and an assumed lens ({degrees} degrees).")),)
+    assert bench.backend.engine.advice[0].text.endswith("an assumed lens (60 degrees).")
+    bench.until(lambda: bench.said("einem angenommenen Objektiv (60 Grad)."))
+
+
+def test_joint_sets_and_states_of_found_nodes_are_german(german, qtbot):
+    dialog = OutputsDialog(Opened(synthetic_rig(), "", False, False, False), pytest.fail, lambda: None, lambda: DARK)
+    qtbot.addWidget(dialog)
+    box = dialog.joints_box
+    assert [box.itemText(k) for k in range(box.count())] == [
+        "own: 21 Gelenke", "openxr: 26 Gelenke", "mediapipe: 21 Gelenke"]
+    table = FoundNodes(pytest.fail, ())
+    qtbot.addWidget(table)
+    table.table.show_records(found(("left", 11)).nodes)
+    assert table.table.text(0, 4) == "bereit" and table.table.heads()[4] == "Zustand"
 
 
 def test_copied_figures_keep_the_decimal_point(german, make_bench):

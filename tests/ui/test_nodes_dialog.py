@@ -242,9 +242,10 @@ def test_conflicts_and_an_empty_network_are_told(qtbot, themed):
 
 
 def test_a_search_ends_with_the_dialog(qtbot, themed):
-    stopped, go_on = threading.Event(), threading.Event()
+    begun, stopped, go_on = threading.Event(), threading.Event(), threading.Event()
 
     def find(progress) -> Search:
+        begun.set()
         go_on.wait(PATIENCE_S)
         try:
             progress("looking for nodes", 0.5)
@@ -255,6 +256,7 @@ def test_a_search_ends_with_the_dialog(qtbot, themed):
     dialog = NodesDialog(DARK, find=find)
     qtbot.addWidget(dialog)
     dialog.show()
+    assert begun.wait(PATIENCE_S)
     dialog.reject()
     go_on.set()
     assert stopped.wait(PATIENCE_S)

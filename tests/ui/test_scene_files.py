@@ -10,8 +10,10 @@ from rhot_app.simulator.nodes import remote
 from rhot_app.simulator.nodes.remote import SCENE_NAME, TwinState
 from rhot_app.simulator.render.camera_controls import Lamp
 from rhot_app.simulator.scene.scene_description import BoardShow, HandShow
-from rhot_app.simulator.scene.scene_file import SceneFields, read_scene, write_scene
+from rhot_app.simulator.scene.scene_file import SceneFields, SceneFile, read_scene, write_scene
+from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.backend.session import Session
+from rhot_node.files import write_document
 
 
 @pytest.fixture
@@ -78,6 +80,17 @@ def test_what_is_saved_is_what_the_twin_shows_now(session, tmp_path):
     assert fields.shown() == BoardShow(on_table=True) and fields.seed == 7
     settings = fields.scene().settings
     assert settings.lamp == Lamp(kelvin=3000.0, flicker=0.1) and settings.preset == "fast"
+
+
+@pytest.mark.parametrize(("show", "words"), [
+    ({"motion": "gone.json"}, "no motion 'gone.json'"), ({"show": "board", "square_mm": "wide"}, "square_mm"),
+    ({"show": "cat"}, "show")])
+def test_a_scene_that_cannot_be_is_refused_while_the_other_rig_still_runs(session, tmp_path, monkeypatch, show, words):
+    path = tmp_path / "scene.json"
+    write_document(path, SceneFile({}, show))
+    monkeypatch.setattr(session, "_clear", lambda report: pytest.fail("the other rig was ended"))
+    with pytest.raises(SimulatorError, match=words):
+        session.open_twin(TwinChoice(None, None, None, "classic", path), lambda text, fraction: None)
 
 
 def test_a_twin_without_a_scene_file_refuses_to_save(session, tmp_path):

@@ -83,17 +83,22 @@ def keyed_motion(file: MotionFile, model: HandModel, centre: Array, seed: int) -
                   model.limits, SwayCurve(file.sway, seed))
 
 
+def find_motion(source: str) -> Path:
+    """The file of the motion named `source`, or at that path. Raises SimulatorError when there is none."""
+    if source in motion_names():
+        return resource_path("motions", f"{source}.json")
+    if not Path(source).exists():
+        raise SimulatorError(f"there is no motion {source!r}: neither a file nor one of {', '.join(motion_names())}.")
+    return Path(source)
+
+
 def load_motion(source: str, model: HandModel, centre: Array, seed: int) -> Motion:
     """The motion named `source`, or of the keyframe file (.json) or recording (.tsv, .csv) at that path.
 
     `centre` (3,) m in the rig frame is where the middle of the hand stands. Raises SimulatorError when there is no
     such motion, RigError when the file is not one.
     """
-    path = Path(source)
-    if source in motion_names():
-        path = resource_path("motions", f"{source}.json")
-    elif not path.exists():
-        raise SimulatorError(f"there is no motion {source!r}: neither a file nor one of {', '.join(motion_names())}.")
+    path = find_motion(source)
     if path.suffix.lower() in (".tsv", ".csv"):
         from rhot_app.simulator.scene.recorded import recorded_motion  # fitting is slow to import and rarely wanted
 

@@ -16,8 +16,9 @@ import msgspec
 
 from rhot_app.calibration.board.standard_board import BOARD, CHARUCO
 from rhot_app.errors import SimulatorError
+from rhot_app.simulator.scene.motion_file import find_motion
 from rhot_app.simulator.scene.scene import Scene, TwinSettings, make_scene, twin_defaults
-from rhot_app.simulator.scene.scene_description import Show
+from rhot_app.simulator.scene.scene_description import BareHandShow, HandShow, Show
 from rhot_node.files import decode_document, decode_json, in_words, read_document_bytes, write_document
 
 FORMAT: Final = "rhot-scene"
@@ -100,6 +101,13 @@ class SceneFields:
             return shown
         except msgspec.ValidationError as exc:
             raise SimulatorError(self._objection(str(exc), kind, SHOW, f"--show {fields['show']}")) from exc
+
+    def require(self) -> None:
+        """Raises what `scene` and `shown` raise, and SimulatorError where there is no such motion of the hand."""
+        self.scene()
+        shown = self.shown()
+        if isinstance(shown, HandShow | BareHandShow):
+            find_motion(shown.motion)
 
     def _take_texts(self, kind: Any, fields: dict[str, Any], prefix: str) -> None:
         """Give the fields of text that a `kind` has the texts that could be read as something else (9,6, or 1)."""

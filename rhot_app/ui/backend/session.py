@@ -120,7 +120,10 @@ class Session:
         if choice.scene is not None:
             from rhot_app.simulator.scene.scene_file import read_scene
 
-            read_scene(choice.scene).scene()  # what cannot be is said while the other rig still runs
+            fields = read_scene(choice.scene)
+            if choice.motion is not None:
+                fields.set("show.motion", choice.motion, "show.motion")
+            fields.require()  # what cannot be is said while the other rig still runs
         self._clear(report)
         self._compile(WINDOW, report)
         report(tr("Starting two simulated cameras …"), 0.15)

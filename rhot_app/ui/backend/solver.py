@@ -18,7 +18,7 @@ from typing import Any
 from rhot_app.errors import CalibrationError
 from rhot_app.progress import Progress
 from rhot_app.ui.backend.solver_process import NICENESS
-from rhot_app.ui.language import tr
+from rhot_app.ui.language import language, tr
 
 _COMMAND = (sys.executable, "-m", "rhot_app.ui.backend.solver_process")
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -87,7 +87,8 @@ class Solver:
     def _started(self) -> subprocess.Popen[bytes]:
         with self._lock:
             if self._process is None or self._process.poll() is not None:
-                self._process = subprocess.Popen(self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                command = (*self._command, language())
+                self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                                  env={**os.environ, **_ONE_THREAD})
             return self._process
 

@@ -1,4 +1,5 @@
-"""The process in which long work of the app runs, started with `python -m`, and a niceness. No Qt.
+"""The process in which long work of the app runs, started with `python -m`, a niceness and a language. No
+Qt but for the translations of a language other than English.
 
 It reads pickled messages from standard input: a module's name to import in good time, or (function, arguments,
 options) to run.
@@ -57,8 +58,11 @@ def _work(message: tuple[Any, tuple[Any, ...], dict[str, Any]], sink: BinaryIO) 
     except Exception as exc:  # the sentence is for the screen; the trace goes where the app's own go
         import traceback
 
+        from rhot_app.ui.language import tr
+
         traceback.print_exc()
-        return "failed", f"The program made a mistake ({type(exc).__name__}: {exc}). Please report it."
+        return "failed", tr("The program made a mistake ({name}: {exc}). Please report it.", name=type(exc).__name__,
+                            exc=exc)
 
 
 def _send(sink: BinaryIO, answer: tuple[Any, ...]) -> None:
@@ -70,6 +74,10 @@ def main() -> None:
     """Keep standard output to the answers, and out of the way of everything else."""
     sink = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints must not end up among the answers
+    if sys.argv[2:] not in ([], ["en"]):
+        from rhot_app.ui.language import use_language
+
+        use_language(sys.argv[2])
     with contextlib.suppress(OSError, AttributeError):
         os.nice((int(sys.argv[1]) if len(sys.argv) > 1 else NICENESS) - os.nice(0))
     with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):

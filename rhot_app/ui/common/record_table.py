@@ -9,8 +9,6 @@ from typing import Any, Generic, TypeVar
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt, Signal
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from rhot_app.ui.language import tr
-
 R = TypeVar("R")
 Index = QModelIndex | QPersistentModelIndex
 
@@ -20,8 +18,9 @@ _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 @dataclass(frozen=True)
 class Column(Generic[R]):
-    """What a column says of a record. `roles` gives what else Qt asks for: tooltip, colours, icon. `write` takes a text
-    that was typed over; without it the cell cannot be edited. `number` stands at the right."""
+    """What a column says of a record, and its `head` as it is shown. `roles` gives what else Qt asks for: tooltip,
+    colours, icon. `write` takes a text that was typed over; without it the cell cannot be edited. `number` stands at
+    the right."""
 
     head: str
     text: Callable[[R], str]
@@ -77,7 +76,7 @@ class RecordModel(QAbstractTableModel, Generic[R]):
         """The columns' heads, and the rows' numbers where a table shows them."""
         if role != Qt.ItemDataRole.DisplayRole:
             return None
-        return tr(self.columns[section].head) if orientation == Qt.Orientation.Horizontal else section + 1
+        return self.columns[section].head if orientation == Qt.Orientation.Horizontal else section + 1
 
     def flags(self, index: Index) -> Qt.ItemFlag:
         """Cells with a `write` can be typed over."""

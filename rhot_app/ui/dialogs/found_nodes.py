@@ -28,12 +28,13 @@ NOBODY = tr_noop("No node was found. Is rhot-node running there, and on the same
                  "through: then type the address in below.")
 _TRUST = {TrustState.OPEN: tr_noop("open to everybody"), TrustState.UNPAIRED: tr_noop("not paired yet"),
           TrustState.PAIRED: tr_noop("paired")}
-COLUMNS: tuple[Column[FoundNode], ...] = (
-    Column(tr_noop("name"), lambda node: node.presence.name),
-    Column(tr_noop("id"), lambda node: str(node.presence.node_id)),
-    Column(tr_noop("address"), lambda node: ", ".join(node.addresses)),
-    Column(tr_noop("trust"), lambda node: tr(_TRUST[node.presence.trust])),
-    Column(tr_noop("state"), lambda node: tr("announces itself") if node.state is None else node.state.name.lower()))
+def _columns() -> tuple[Column[FoundNode], ...]:
+    return (
+        Column(tr("name"), lambda node: node.presence.name),
+        Column(tr("id"), lambda node: str(node.presence.node_id)),
+        Column(tr("address"), lambda node: ", ".join(node.addresses)),
+        Column(tr("trust"), lambda node: tr(_TRUST[node.presence.trust])),
+        Column(tr("state"), lambda node: tr("announces itself") if node.state is None else tr(node.state.name.lower())))
 
 
 class FoundNodes(QWidget):
@@ -47,7 +48,7 @@ class FoundNodes(QWidget):
         super().__init__(parent)
         self._find = find
         self._job: Job | None = None
-        self.table: RecordTable[FoundNode] = RecordTable(COLUMNS)
+        self.table: RecordTable[FoundNode] = RecordTable(_columns())
         self.table.fit_columns()
         self.table.setTabKeyNavigation(False)
         self.table.setShowGrid(False)

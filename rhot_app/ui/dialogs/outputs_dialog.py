@@ -102,8 +102,8 @@ class OutputsDialog(QDialog):
             self.kind_box.addItem(tr(kind_of(name).title), name)
             self.kind_box.setItemData(self.kind_box.count() - 1, tr(kind_of(name).meaning), Qt.ItemDataRole.ToolTipRole)
         for name, (title, meaning) in JOINT_SETS.items():
-            self.joints_box.addItem(title, name)
-            self.joints_box.setItemData(self.joints_box.count() - 1, meaning, Qt.ItemDataRole.ToolTipRole)
+            self.joints_box.addItem(tr(title), name)
+            self.joints_box.setItemData(self.joints_box.count() - 1, tr(meaning), Qt.ItemDataRole.ToolTipRole)
         self.kind_box.setToolTip(tr("Which protocol the other program understands."))
         self.joints_box.setToolTip(tr("The joint set: which joints, in whose order and axes."))
         self.rate_box.setRange(0.0, 1000.0)

@@ -16,7 +16,7 @@ from rhot_app.hand.anatomy import FingerAnatomy
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig, RigNode
 from rhot_app.ui.common.record_table import Column, RecordTable
-from rhot_app.ui.language import tr, tr_noop
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.words import HANDS
 from rhot_node.markers import Marker
 
@@ -28,14 +28,15 @@ def _field_of_view(node: RigNode) -> str:
     return f"{np.degrees(CameraModel.from_rig(node.intrinsics, node.pose).field_of_view[0]):.1f}°"
 
 
-CAMERA_COLUMNS: tuple[Column[RigNode], ...] = (
-    Column(tr_noop("camera"), lambda node: node.name),
-    Column(tr_noop("picture [px]"), lambda node: f"{node.intrinsics.width} × {node.intrinsics.height}"),
-    Column(tr_noop("field of view"), _field_of_view),
-    Column(tr_noop("focal length [px]"), lambda node: f"{node.intrinsics.fx:.1f}, {node.intrinsics.fy:.1f}"),
-    Column(tr_noop("centre [px]"), lambda node: f"{node.intrinsics.cx:.1f}, {node.intrinsics.cy:.1f}"),
-    Column("k1, k2", lambda node: "{:.3f}, {:.3f}".format(*node.intrinsics.distortion[:2])),
-    Column(tr_noop("address : port"), lambda node: f"{node.address}:{node.control_port}"))
+def _camera_columns() -> tuple[Column[RigNode], ...]:
+    return (
+        Column(tr("camera"), lambda node: node.name),
+        Column(tr("picture [px]"), lambda node: f"{node.intrinsics.width} × {node.intrinsics.height}"),
+        Column(tr("field of view"), _field_of_view),
+        Column(tr("focal length [px]"), lambda node: f"{node.intrinsics.fx:.1f}, {node.intrinsics.fy:.1f}"),
+        Column(tr("centre [px]"), lambda node: f"{node.intrinsics.cx:.1f}, {node.intrinsics.cy:.1f}"),
+        Column("k1, k2", lambda node: "{:.3f}, {:.3f}".format(*node.intrinsics.distortion[:2])),
+        Column(tr("address : port"), lambda node: f"{node.address}:{node.control_port}"))
 
 
 def _colours(marker: Marker) -> dict[int, QColor]:
@@ -46,23 +47,25 @@ def _colours(marker: Marker) -> dict[int, QColor]:
             Qt.ItemDataRole.ForegroundRole: QColor("#000000" if light else "#ffffff")}
 
 
-MARKER_COLUMNS: tuple[Column[Marker], ...] = (
-    Column(tr_noop("marker"), lambda marker: marker.id),
-    Column(tr_noop("colour"), lambda marker: hex_of(marker.display_rgb), roles=_colours),
-    Column(tr_noop("place"), lambda marker: tr((marker.role or "free").replace("_", " "))),
-    Column(tr_noop("shape"), lambda marker: tr(marker.shape)),
-    Column(tr_noop("radius [mm]"), lambda marker: f"{marker.radius_mm:.1f}" if marker.radius_mm else "–"))
+def _marker_columns() -> tuple[Column[Marker], ...]:
+    return (
+        Column(tr("marker"), lambda marker: marker.id),
+        Column(tr("colour"), lambda marker: hex_of(marker.display_rgb), roles=_colours),
+        Column(tr("place"), lambda marker: tr((marker.role or "free").replace("_", " "))),
+        Column(tr("shape"), lambda marker: tr(marker.shape)),
+        Column(tr("radius [mm]"), lambda marker: f"{marker.radius_mm:.1f}" if marker.radius_mm else "–"))
 
 
 def _bone(number: int) -> Callable[[tuple[str, FingerAnatomy]], str]:
     return lambda named: f"{named[1].bones_mm[number]:.1f}"
 
 
-HAND_COLUMNS: tuple[Column[tuple[str, FingerAnatomy]], ...] = (
-    Column(tr_noop("finger"), lambda named: tr(named[0])), Column(tr_noop("first bone [mm]"), _bone(0)),
-    Column(tr_noop("second [mm]"), _bone(1)),
-    Column(tr_noop("last [mm]"), _bone(2)),
-    Column(tr_noop("marker to last joint [mm]"), lambda named: f"{named[1].marker_mm:.1f}"))
+def _hand_columns() -> tuple[Column[tuple[str, FingerAnatomy]], ...]:
+    return (
+        Column(tr("finger"), lambda named: tr(named[0])), Column(tr("first bone [mm]"), _bone(0)),
+        Column(tr("second [mm]"), _bone(1)),
+        Column(tr("last [mm]"), _bone(2)),
+        Column(tr("marker to last joint [mm]"), lambda named: f"{named[1].marker_mm:.1f}"))
 
 
 def baseline_text(rig: Rig) -> str:
@@ -85,11 +88,11 @@ class RigDialog(QDialog):
         self.setWindowTitle(tr("Rig {name}", name=rig.name))
         self.setProperty("guide", "calibration")
         self.tabs = QTabWidget()
-        self.tabs.addTab(_page(_table(CAMERA_COLUMNS, rig.nodes), baseline_text(rig)), tr("Cameras"))
-        self.tabs.addTab(_page(_table(MARKER_COLUMNS, rig.markers.markers),
+        self.tabs.addTab(_page(_table(_camera_columns(), rig.nodes), baseline_text(rig)), tr("Cameras"))
+        self.tabs.addTab(_page(_table(_marker_columns(), rig.markers.markers),
                                tr("Marker set {name}. Nodes and master must use the same one.",
                                   name=rig.markers.name or tr("without a name"))), tr("Markers"))
-        self.tabs.addTab(_page(_table(HAND_COLUMNS, [(name, rig.hand.fingers[name]) for name in FINGERS]),
+        self.tabs.addTab(_page(_table(_hand_columns(), [(name, rig.hand.fingers[name]) for name in FINGERS]),
                                tr("{name}, {hand}; wrist {breadth:.0f} × {thickness:.0f} mm.",
                                   name=rig.hand.name or tr("Hand"), hand=tr(HANDS[rig.hand.side]),
                                   breadth=rig.hand.wrist_breadth_mm, thickness=rig.hand.wrist_thickness_mm)),

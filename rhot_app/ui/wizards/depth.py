@@ -166,10 +166,11 @@ class DistanceStep(Step):
 
 # -- the page of the distances -----------------------------------------------------------------------------------------
 
-_COLUMNS: tuple[Column[DepthRow], ...] = (
-    Column(tr_noop("cm"), lambda row: f"{100 * row.distance_m:.1f}", number=True),
-    Column(tr_noop("px"), lambda row: f"{row.disparity_px:.2f}", number=True),
-    Column("± px", lambda row: f"{row.sd_px:.2f}", number=True))
+def _columns() -> tuple[Column[DepthRow], ...]:
+    return (
+        Column(tr("cm"), lambda row: f"{100 * row.distance_m:.1f}", number=True),
+        Column(tr("px"), lambda row: f"{row.disparity_px:.2f}", number=True),
+        Column("± px", lambda row: f"{row.sd_px:.2f}", number=True))
 
 
 class DistancePage(Page):
@@ -200,7 +201,7 @@ class DistancePage(Page):
         form.addRow(tr("Marker"), self.marker)
         form.addRow(tr("Distance"), self.distance)
         form.addRow(tr("Disparity"), self.seen)
-        self.table = RecordTable(_COLUMNS)
+        self.table = RecordTable(_columns())
         self.table.setToolTip(tr("Distance, mean disparity and its spread within the second."))
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.remove_button = QPushButton(tr("Remove the chosen row"))

@@ -259,7 +259,7 @@ class MeterPage(MovementPage):
         self._feed = states
         self._meters = meters
         self.table: RecordTable[tuple[str, ...]] = RecordTable(
-            [Column(head, itemgetter(cell), number=cell > 0) for cell, head in enumerate(_HEADS)], selectable=False)
+            [Column(tr(head), itemgetter(cell), number=cell > 0) for cell, head in enumerate(_HEADS)], selectable=False)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.setShowGrid(False)

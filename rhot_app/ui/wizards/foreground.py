@@ -235,7 +235,7 @@ class EmptyStep(LearningStep):
                 break
             if time.monotonic() > self._until_s + _WAIT_S:
                 raise EngineError(tr("{names}: the background was not learnt in time. Look at the Nodes panel, then "
-                                     "learn it again.", names=" and ".join(waiting)))
+                                     "learn it again.", names=", ".join(waiting)))
             time.sleep(_LOOK_S)
         if all(watch.seen for watch in watches.values()):
             self.verdict = judge(tr("the scene is learnt."),
@@ -295,7 +295,7 @@ class SkinStep(LearningStep):
         without = [name for name, node_id in self.nodes.items() if not self._finds_skin(command, node_id)]
         return "" if not without else (
             tr("No skin was found in the picture of {names}, so the colours of any skin are used there. Hold the hand "
-               "into both pictures and learn it again.", names=" and ".join(without)))
+               "into both pictures and learn it again.", names=", ".join(without)))
 
     def _finds_skin(self, command: Command, node_id: int) -> bool:
         with self._asking:

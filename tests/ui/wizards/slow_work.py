@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from rhot_app.errors import CalibrationError
+from rhot_app.ui.language import tr
 
 
 def count(steps: int, pause_s: float, *, progress: Callable[[str, float], None]) -> int:
@@ -29,6 +30,12 @@ def hold_the_interpreter(seconds: float, *, progress: Callable[[str, float], Non
 def who(*, progress: Callable[[str, float], None]) -> tuple[int, int, str]:
     """Process id, niceness, threads of numerical libraries."""
     return os.getpid(), os.nice(0), os.environ["OPENBLAS_NUM_THREADS"]
+
+
+def say_what_is_done(*, progress: Callable[[str, float], None]) -> str:
+    """Report in the language of the window."""
+    progress(tr("Preparing the tracker …"), 1.0)
+    return tr("Everything else is shown.")
 
 
 def refuse(*, progress: Callable[[str, float], None]) -> None:

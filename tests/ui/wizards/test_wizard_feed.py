@@ -21,6 +21,7 @@ from rhot_app.ui.backend.feed import LiveFeed, StateFeed
 from rhot_app.ui.backend.reader import Reader
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.backend.solver_process import NICENESS as SOLVER_NICENESS
+from rhot_app.ui.language import use_language
 from rhot_app.ui.wizards.framework.picture_worker import PictureWorker
 from rhot_app.ui.wizards.framework.step import Step
 
@@ -232,6 +233,18 @@ def test_work_runs_in_another_process_that_gives_way(environment):
     solver.stop()
     assert pid != os.getpid() and niceness == SOLVER_NICENESS and threads == "1"
     assert WINDOW_NICENESS < SOLVER_NICENESS < 19, "it gives way to the window, and is not starved by a busy computer"
+
+
+def test_work_speaks_the_language_of_the_window(environment, capfd):
+    use_language("de")
+    solver, said = Solver(niceness=0), []
+    try:
+        result = solver.run(slow_work.say_what_is_done, (), lambda text, fraction: said.append(text))
+    finally:
+        solver.stop()
+        use_language("en")
+    assert (said, result) == (["Der Tracker wird vorbereitet …"], "Alles andere wird gezeigt.")
+    assert capfd.readouterr().err == ""
 
 
 def test_the_solving_process_imports_no_qt():

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QHeaderView, QPushButton
 
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.shapes import shape_pixmap
+from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.framework.swatches import ARROW_PX, CHIP, Rgb, change_of, swatch
 
@@ -38,9 +39,9 @@ class PaintList(RecordTable[PaintRow]):
     picked = Signal(str)
 
     def __init__(self, scheme: Scheme, heads: tuple[str, str]) -> None:
-        super().__init__((Column("", lambda row: "", roles=self._state), Column(heads[0], attrgetter("name"),
-                                                                               roles=self._patch),
-                          Column(heads[1], attrgetter("text"))))
+        super().__init__((Column("", lambda row: "", roles=self._state),
+                          Column(tr(heads[0]), attrgetter("name"), roles=self._patch),
+                          Column(tr(heads[1]), attrgetter("text"))))
         self._scheme = scheme
         self._filling = False
         self.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)

@@ -245,7 +245,7 @@ class BoardStep(Step):
         if found == 0:
             return tr("Seen: this is the board. Press Next.") if self._search.recognised else tr("Show the board to "
                                                                                                  "check it.")
-        names = " and ".join(name for name, view in self._search.views.items() if view is not None)
+        names = ", ".join(name for name, view in self._search.views.items() if view is not None)
         return tr("Seen by {names}: this is the board.", names=names)
 
     def _hint(self) -> str:

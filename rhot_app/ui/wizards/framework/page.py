@@ -148,7 +148,7 @@ class RowTable(RecordTable[Row]):
             return found
 
         texts = (attrgetter("what"), attrgetter("before"), attrgetter("after"))
-        super().__init__([Column(head, text, roles=partial(roles, cell))
+        super().__init__([Column(tr(head), text, roles=partial(roles, cell))
                           for cell, (head, text) in enumerate(zip(heads, texts, strict=True))], selectable=False)
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.setShowGrid(False)
@@ -180,7 +180,7 @@ def figure_columns(heads: Sequence[str]) -> list[Column[tuple[str, ...]]]:
         side = Qt.AlignmentFlag.AlignRight if row[cell][:1] in "-–0123456789" else Qt.AlignmentFlag.AlignLeft
         return {Qt.ItemDataRole.TextAlignmentRole: side | Qt.AlignmentFlag.AlignVCenter}
 
-    return [Column(head, itemgetter(cell), roles=partial(alignment, cell)) for cell, head in enumerate(heads)]
+    return [Column(tr(head), itemgetter(cell), roles=partial(alignment, cell)) for cell, head in enumerate(heads)]
 
 
 # -- Charts of a result in the middle of a wizard, one below the other -------------------------------------------------
