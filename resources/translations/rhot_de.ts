@@ -3132,8 +3132,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Ein Rig braucht zwei Knoten, die antworten und mit diesem Rechner gekoppelt sind.</translation>
     </message>
     <message>
-        <source>Both nodes have the id {ids}; give one another node_id in its settings file.</source>
-        <translation>Beide Knoten haben die ID {ids}; einem davon in seiner Einstellungsdatei eine andere node_id geben.</translation>
+        <source>Both nodes have the id {node_id}; give one another node_id in its settings file.</source>
+        <translation>Beide Knoten haben die ID {node_id}; einem davon in seiner Einstellungsdatei eine andere node_id geben.</translation>
     </message>
     <message>
         <source>The process that computes ended unexpectedly; try again. If it happens again, it may have run out of memory: use fewer pictures or a shorter recording.</source>
@@ -4220,8 +4220,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Diese Seite schließen. Gelöschtes ist dann endgültig weg.</translation>
     </message>
     <message>
-        <source>Deleted {undoable}. Undo brings it back; it is gone for good when this page is closed.</source>
-        <translation>{undoable} gelöscht. Rückgängig holt es zurück; es ist endgültig weg, wenn diese Seite schließt.</translation>
+        <source>Deleted {name}. Undo brings it back; it is gone for good when this page is closed.</source>
+        <translation>{name} gelöscht. Rückgängig holt es zurück; es ist endgültig weg, wenn diese Seite schließt.</translation>
     </message>
     <message>
         <source>{stem} continues {continues}: the engine had stopped and was started again.</source>
@@ -5308,8 +5308,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Der Tracker liefert keine Posen. Zurückgehen und ihn verbinden.</translation>
     </message>
     <message>
-        <source>The marker {markers} is not seen by two cameras. Hold it before them, or choose another one.</source>
-        <translation>Der Marker {markers} wird nicht von zwei Kameras gesehen. Ihn vor sie halten oder einen anderen wählen.</translation>
+        <source>The marker {marker} is not seen by two cameras. Hold it before them, or choose another one.</source>
+        <translation>Der Marker {marker} wird nicht von zwei Kameras gesehen. Ihn vor sie halten oder einen anderen wählen.</translation>
     </message>
     <message>
         <source>of the tracker about two axes, {degrees:.0f} degrees rms</source>
@@ -5320,16 +5320,16 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Reichweite</translation>
     </message>
     <message>
-        <source>of the finger across its longest way, {enough_m:.0f} mm rms</source>
-        <translation>des Fingers über seinen längsten Weg, {enough_m:.0f} mm Effektivwert</translation>
+        <source>of the finger across its longest way, {enough_mm:.0f} mm rms</source>
+        <translation>des Fingers über seinen längsten Weg, {enough_mm:.0f} mm Effektivwert</translation>
     </message>
     <message>
         <source>speed</source>
         <translation>Tempo</translation>
     </message>
     <message>
-        <source>of the finger, {enough_m_s:.0f} mm/s rms</source>
-        <translation>des Fingers, {enough_m_s:.0f} mm/s Effektivwert</translation>
+        <source>of the finger, {enough_mm_s:.0f} mm/s rms</source>
+        <translation>des Fingers, {enough_mm_s:.0f} mm/s Effektivwert</translation>
     </message>
     <message>
         <source>Keep the marker in view.</source>
@@ -5612,8 +5612,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Die Hand mit ihren Markern zeigen und an den Reglern drehen, bis das Urteil gut ist.</translation>
     </message>
     <message>
-        <source>{partition} The settings in force are no better.</source>
-        <translation>{partition} Die geltenden Einstellungen sind nicht besser.</translation>
+        <source>{sentence} The settings in force are no better.</source>
+        <translation>{sentence} Die geltenden Einstellungen sind nicht besser.</translation>
     </message>
     <message>
         <source>Palm to the cameras</source>
@@ -5816,8 +5816,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Zurückgehen und eine Farbe aufnehmen.</translation>
     </message>
     <message>
-        <source>{chosen} is found by {sum} of {found} cameras.</source>
-        <translation>{chosen} wird von {sum} von {found} Kameras gefunden.</translation>
+        <source>{marker} is found by {finding} of {count} cameras.</source>
+        <translation>{marker} wird von {finding} von {count} Kameras gefunden.</translation>
     </message>
     <message>
         <source>Since the colours were picked: {sentence}</source>
@@ -5904,8 +5904,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>aufgenommen</translation>
     </message>
     <message>
-        <source>{names} of {ids} markers</source>
-        <translation>{names} von {ids} Markern</translation>
+        <source>{picked} of {count} markers</source>
+        <translation>{picked} von {count} Markern</translation>
     </message>
     <message>
         <source>seen moving</source>
@@ -5924,8 +5924,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Anklicken oder darüberziehen: {paint}.</translation>
     </message>
     <message>
-        <source>Choose {wrong} and click its paint.</source>
-        <translation>{wrong} auswählen und seine Farbe anklicken.</translation>
+        <source>Choose {marker} and click its paint.</source>
+        <translation>{marker} auswählen und seine Farbe anklicken.</translation>
     </message>
     <message>
         <source>Move and turn the hand slowly, near and far.</source>
@@ -5944,8 +5944,8 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>die Farbe von {chosen}</translation>
     </message>
     <message>
-        <source>{wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z.</source>
-        <translation>{wrong} kann nicht so bleiben: seine Zeile auswählen und seine Farbe anklicken oder Strg+Z drücken.</translation>
+        <source>{marker} cannot stay so: choose its line and click its paint, or press Ctrl+Z.</source>
+        <translation>{marker} kann nicht so bleiben: seine Zeile auswählen und seine Farbe anklicken oder Strg+Z drücken.</translation>
     </message>
     <message>
         <source>Pick bare skin too: then it is said whether a marker looks like it.</source>

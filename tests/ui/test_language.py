@@ -24,6 +24,7 @@ from rhot_app.ui.dialogs.found_nodes import FoundNodes
 from rhot_app.ui.dialogs.outputs_dialog import OutputsDialog
 from rhot_app.ui.language import date_text, tr, use_language
 from rhot_app.ui.models.palette import DARK
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.models.words import CONDITIONS, tip
 
 MESSAGE = """<message{numerus}><source>{source}</source><comment>{comment}</comment>
@@ -172,6 +173,11 @@ def test_a_number_in_the_words_of_an_advice_is_said_in_german(german, make_bench
         guess=words(" The distance is a guess, by the hand's size and an assumed lens ({degrees} degrees).")),)
     assert bench.backend.engine.advice[0].text.endswith("an assumed lens (60 degrees).")
     bench.until(lambda: bench.said("einem angenommenen Objektiv (60 Grad)."))
+
+
+def test_a_marker_of_ones_own_keeps_its_name(german):
+    assert tr("Open") != "Open" and marker_name("Open") == "Open"
+    assert marker_name("thumb_tip") == tr("thumb tip") != "thumb tip"
 
 
 def test_joint_sets_and_states_of_found_nodes_are_german(german, qtbot):

@@ -79,8 +79,8 @@ def first_rig(answers: list[NodeAnswer]) -> Rig:
         raise SourceError(tr("A rig needs two nodes that answer and are paired with this computer."))
     ids = [answer.who.node_id for answer in usable if answer.who is not None]
     if ids[0] == ids[1]:
-        raise SourceError(tr("Both nodes have the id {ids}; give one another node_id in its settings file.",
-                             ids=ids[0]))
+        raise SourceError(tr("Both nodes have the id {node_id}; give one another node_id in its settings file.",
+                             node_id=ids[0]))
     template = load_rig(resource_path("rigs", "two_pis.json"))
     nodes = tuple(_with_address(node, answer) for node, answer in zip(template.nodes, usable, strict=True))
     return msgspec.structs.replace(template, nodes=nodes)

@@ -28,8 +28,8 @@ class ActionKeys:
     def __init__(self, actions: Iterable[QAction], settings: Settings, menus: Iterable[QAction] = ()) -> None:
         """`menus` of the menu bar, whose letters no action can have as its key."""
         self._settings = settings
-        self._letters = {QKeySequence.mnemonic(menu.text()).toString(): tr("the menu {menu}", menu=title_of(menu))
-                         for menu in menus}
+        self._letters = {letter: tr("the menu {menu}", menu=title_of(menu)) for menu in menus
+                         if (letter := QKeySequence.mnemonic(menu.text()).toString())}
         self.actions = list(actions)
         self._own = {action.objectName(): action.shortcut() for action in self.actions}
         self._meanings = {action.objectName(): action.toolTip() for action in self.actions}
@@ -40,10 +40,11 @@ class ActionKeys:
         return next(action for action in self.actions if action.objectName() == name)
 
     def restore(self) -> None:
-        """The keys as the settings have them."""
+        """The keys as the settings have them, but those that are a menu's letter in this language."""
         for action in self.actions:
             chosen = self._settings.key(action.objectName())
-            self._set(action, self._own[action.objectName()] if chosen is None else QKeySequence(chosen))
+            key = self._own[action.objectName()] if chosen is None else QKeySequence(chosen)
+            self._set(action, self._own[action.objectName()] if chosen and self._reserved(key) else key)
 
     def is_own(self, action: QAction) -> bool:
         """Whether the action has the key that it was made with."""
@@ -52,7 +53,7 @@ class ActionKeys:
     def choose(self, action: QAction, key: QKeySequence) -> str:
         """Give an action another key, or none. The sentence that says why it cannot have it, else ""."""
         text = key.toString()
-        holder = tr(_FIXED.get(text, "")) or self._letters.get(text) or next(
+        holder = self._reserved(key) or next(
             (title_of(one) for one in self.actions if one is not action and text and one.shortcut() == key), "")
         if holder:
             return tr("{text} is the key of {holder}. Choose another, or take it from there first.",
@@ -61,6 +62,11 @@ class ActionKeys:
         self._settings.set_key(action.objectName(), None if own else text)
         self._set(action, key)
         return ""
+
+    def _reserved(self, key: QKeySequence) -> str:
+        """What a key serves that no action can have, else ""."""
+        text = key.toString()
+        return tr(_FIXED.get(text, "")) or self._letters.get(text, "")
 
     def choose_own(self, action: QAction) -> str:
         """Give an action the key that it was made with; what `choose` says."""

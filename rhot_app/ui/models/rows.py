@@ -16,7 +16,7 @@ from rhot_app.engine.status import NodeStatus
 from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.meters import unused_frames
-from rhot_app.ui.models.words import KNOWLEDGE, NODES, UNKNOWN_STATE, Look, marker_look
+from rhot_app.ui.models.words import KNOWLEDGE, NAMES, NODES, UNKNOWN_STATE, Look, marker_look
 
 # -- standard deviation along the worst axis ---------------------------------------------------------------------------
 
@@ -199,9 +199,10 @@ def palm_text(state: HandState, by_calibration: CalibrationAccuracy = KNOWN_EXAC
     return f"{place}, ± {turn:.1f}°" if place and math.isfinite(turn) else ""
 
 
-def short_name(marker: str) -> str:
-    """Marker id as people say it: "thumb_tip" is "thumb tip"."""
-    return marker.replace("_", " ")
+def marker_name(marker: str) -> str:
+    """Marker id as people say it: "thumb_tip" is "thumb tip". Names of the shipped sets are translated, others stay."""
+    name = marker.replace("_", " ")
+    return tr(name) if name in NAMES else name
 
 
 def bytes_text(count: int) -> str:

@@ -169,7 +169,7 @@ def tip(term: str) -> str:
     return tr(TERMS[term])
 
 
-# -- names of other rooms that are shown -----------------------------------------------------------------------------
+# -- names from outside of the window that are shown -------------------------------------------------------------------
 
 NAMES: Final = (
     tr_noop("thumb"), tr_noop("index"), tr_noop("middle"), tr_noop("ring"), tr_noop("little"), tr_noop("wrist"),

@@ -19,7 +19,7 @@ from rhot_app.ui.common.shapes import paint_tag
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.label_layout import place_at_sides
 from rhot_app.ui.models.palette import Scheme, visible_on
-from rhot_app.ui.models.rows import short_name
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.panels.empty_state import EmptyState
 from rhot_app.ui.scene.hand_mesh import BONES
 from rhot_node.markers import MarkerSet
@@ -91,7 +91,7 @@ class CameraView(QWidget):
         self._image, self._frame, self.marks, self.contours = image, (preview.width, preview.height), [], []
         if len(preview.pixels) == len(markers.ids):
             doubtful = int(MarkerFlag.PARTIAL | MarkerFlag.AMBIGUOUS)
-            self.marks = [Mark(QPointF(float(x), float(y)), tr(short_name(marker.id)),
+            self.marks = [Mark(QPointF(float(x), float(y)), marker_name(marker.id),
                                visible_on(hex_of(marker.display_rgb), "#000000", 3.0), not int(flag) & doubtful)
                           for (x, y), flag, marker in zip(preview.pixels, preview.flags, markers.markers, strict=True)
                           if np.isfinite(x) and np.isfinite(y)]

@@ -13,7 +13,7 @@ from rhot_app.state import HandState
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.rows import MarkerRow, marker_rows, short_name
+from rhot_app.ui.models.rows import MarkerRow, marker_name, marker_rows
 from rhot_app.ui.models.words import Look, tip
 from rhot_app.ui.panels.empty_state import EmptyState
 
@@ -93,7 +93,7 @@ class MarkersPanel(QWidget):
             mark, spread, word = ShapeMark(12), _muted("", meaning), _muted("", "")
             spread.setMinimumWidth(spread.fontMetrics().horizontalAdvance("0.00"))
             self._grid.addWidget(Swatch(hex_of(marker.display_rgb), self._scheme.muted), row, 0)
-            self._grid.addWidget(QLabel(tr(short_name(marker.id))), row, 1)
+            self._grid.addWidget(QLabel(marker_name(marker.id)), row, 1)
             self._grid.addWidget(spread, row, 2)
             self._grid.addWidget(word, row, 3)
             self._grid.addWidget(mark, row, 4)

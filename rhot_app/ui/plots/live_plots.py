@@ -16,7 +16,7 @@ from rhot_app.ui.backend.live import LATENCY_COLUMNS, LOST
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.meters import BUDGET_S
 from rhot_app.ui.models.palette import STAGE_COLOURS, Scheme, visible_on
-from rhot_app.ui.models.rows import short_name
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.models.words import STAGES, tip
 from rhot_app.ui.plots.plot_panel import DASHES, LegendEntry, Line, PlotPanel, newest, number
 
@@ -49,7 +49,7 @@ class JitterPlot(PlotPanel):
             colour = visible_on(hex_of(marker.display_rgb), self._scheme.panel)
             dash = DASHES[k % len(DASHES)]
             self._curves.append(self.plot.plot(pen=pg.mkPen(colour, width=2, style=dash), connect="finite"))
-            entries.append(LegendEntry(tr(short_name(marker.id)), colour, dash))
+            entries.append(LegendEntry(marker_name(marker.id), colour, dash))
         self.legend.set_entries(entries)
 
     def draw(self, seconds: Array, rows: Array, names: tuple[str, ...]) -> None:

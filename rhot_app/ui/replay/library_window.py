@@ -160,8 +160,8 @@ class LibraryWindow(ToolWindow):
         self.video_button.setEnabled(entry is not None and entry.video and self._collecting is None)
         undoable = self.library.undoable
         self.undo_button.setEnabled(bool(undoable))
-        said = [tr("Deleted {undoable}. Undo brings it back; it is gone for good when this page is closed.",
-                   undoable=undoable)] if undoable else []
+        said = [tr("Deleted {name}. Undo brings it back; it is gone for good when this page is closed.",
+                   name=undoable)] if undoable else []
         if entry is not None and entry.problem:
             said.append(entry.problem)
         elif entry is not None and entry.continues:

@@ -15,7 +15,7 @@ from rhot_app.hand.skeleton import FINGERS, JOINTS
 from rhot_app.project import OTHER_HAND, Rig
 from rhot_app.state import HandState, Knowledge
 from rhot_app.ui.language import tr
-from rhot_app.ui.models.rows import position_text, sd_text, short_name, total_sd
+from rhot_app.ui.models.rows import marker_name, position_text, sd_text, total_sd
 from rhot_app.ui.models.words import KNOWLEDGE, each_hand
 from rhot_app.ui.scene.hand_mesh import TIPS
 from rhot_node.markers import MarkerSet
@@ -102,7 +102,7 @@ class Spot:
 
 def spots(state: HandState, hands: Sequence[str] = ("",)) -> list[Spot]:
     """Markers first, then the joints that no marker's middle stands for; `hands` are their names, "" for none."""
-    found = [Spot(tr("marker {name}", name=tr(short_name(name))), Knowledge(int(state.marker_knowledge[k])),
+    found = [Spot(tr("marker {name}", name=marker_name(name)), Knowledge(int(state.marker_knowledge[k])),
                   state.marker_positions[k], state.marker_covariances[k]) for k, name in enumerate(state.marker_ids)]
     for name, hand in zip(hands, each_hand(state), strict=False):  # the other hand is not there with every tracker
         found += [Spot(f"{name} {joint_name(JOINTS[k])}".lstrip(), Knowledge(int(hand.joint_knowledge[k])),

@@ -17,7 +17,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
-from rhot_app.ui.models.rows import short_name
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.models.words import KINDS, each_hand, hand_names
 from rhot_app.ui.scene.ellipsoid_mesh import EllipsoidChoice
 from rhot_app.ui.scene.frames import (
@@ -224,7 +224,7 @@ class SceneView(GLViewWidget):
                  and not (marker.role or "").endswith(("_tip", "_wrist"))}
         named = [k for k, name in enumerate(self._state.marker_ids) if name not in inner]
         return (to_display(self._state.marker_positions[named]),
-                [tr(short_name(self._state.marker_ids[k])) for k in named])
+                [marker_name(self._state.marker_ids[k]) for k in named])
 
     def _projection(self) -> QMatrix4x4:
         return self.projectionMatrix(self.getViewport(), self.getViewport()) * self.viewMatrix()

@@ -216,8 +216,8 @@ class TogetherStep(MovementStep):
         if not self.feed.between(self._now_ns() - _RECENT_NS, self._now_ns()):
             return self.feed.notice or tr("The tracker gives no poses. Go back and connect it.")
         if not self.seen():
-            return (tr("The marker {markers} is not seen by two cameras. Hold it before them, or choose another one.",
-                       markers=self.markers[self.marker]))
+            return (tr("The marker {marker} is not seen by two cameras. Hold it before them, or choose another one.",
+                       marker=self.markers[self.marker]))
         return ""
 
     def view(self) -> StepView:
@@ -236,9 +236,9 @@ def bars_of(coverage: Coverage | None) -> tuple[Bar, ...]:
     return (Bar(tr("turn"), min(turn, 1.0),
                 tr("of the tracker about two axes, {degrees:.0f} degrees rms", degrees=np.degrees(ENOUGH_RAD))),
             Bar(tr("reach"), min(reach, 1.0),
-                tr("of the finger across its longest way, {enough_m:.0f} mm rms", enough_m=1000.0 * ENOUGH_M)),
+                tr("of the finger across its longest way, {enough_mm:.0f} mm rms", enough_mm=1000.0 * ENOUGH_M)),
             Bar(tr("speed"), min(speed, 1.0),
-                tr("of the finger, {enough_m_s:.0f} mm/s rms", enough_m_s=1000.0 * ENOUGH_M_S)))
+                tr("of the finger, {enough_mm_s:.0f} mm/s rms", enough_mm_s=1000.0 * ENOUGH_M_S)))
 
 
 def advice(coverage: Coverage | None) -> str:

@@ -535,8 +535,8 @@ class SettingsStep(Step):
                 if self.verdict.acceptable else None
         verdict = self.verdict
         if verdict.grade is Grade.POOR and self._before is Grade.POOR:
-            verdict = judge(tr("{partition} The settings in force are no better.",
-                               partition=verdict.sentence.partition(": ")[2]),
+            verdict = judge(tr("{sentence} The settings in force are no better.",
+                               sentence=verdict.sentence.partition(": ")[2]),
                             [replace(finding, grade=Grade.FAIR) for finding in verdict.findings])
         return Proposal(CAMERA.reason, verdict, self.choices.rows(self.choices.changed), changes=tuple(
                             NodeChange(node.node_id, *self.choices.differences(node.node_id))

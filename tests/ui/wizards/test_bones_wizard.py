@@ -66,6 +66,7 @@ def test_from_a_movement_to_a_rig_with_that_hand(hands):
     styles = {page.table.records_model.index(row, 3).data(Qt.ItemDataRole.BackgroundRole).style() for row in range(15)}
     assert Qt.BrushStyle.BDiagPattern in styles, "what is only usual is hatched"
     assert "index" in page.reaches.text()
+    hands.until(lambda: page.reaches.height() >= page.reaches.heightForWidth(page.reaches.width()))
     before = load_rig(hands.path).hand
     hands.next()
     hands.use()

@@ -140,8 +140,8 @@ class BoundsStep(SolveStep):
         chosen = self.markers.ids.index(self.chosen) if self.show == "chosen" else None
         index = self.markers.ids.index(self.chosen)
         found = [picture.seen[index].found for picture in self._masked.values()]
-        hint = tr("{chosen} is found by {sum} of {found} cameras.", chosen=self.chosen, sum=sum(found),
-                  found=len(found)) if found else ""
+        hint = tr("{marker} is found by {finding} of {count} cameras.", marker=self.chosen, finding=sum(found),
+                  count=len(found)) if found else ""
         hint = " ".join([hint, *(f"{name}: {picture.why(index)}" for name, picture in self._masked.items()
                                  if picture.why(index))])
         drift = drift_of(self._masked)

@@ -175,7 +175,7 @@ class PickStep(Step):
         names, gathering = self.gathering.names, self.gathering
         seen = sum(gathering.variety(name) for name in names) / len(names) if names else 0.0
         bars = (Bar(tr("picked"), len(names) / len(self.base.ids),
-                    tr("{names} of {ids} markers", names=len(names), ids=len(self.base.ids))),
+                    tr("{picked} of {count} markers", picked=len(names), count=len(self.base.ids))),
                 Bar(tr("seen moving"), seen, tr("places and angles at which the markers were seen so far")))
         return StepView(self._sentence(),
                         done=gathering.enough and len(names) == len(self.base.ids) and not self._wrong,
@@ -188,7 +188,7 @@ class PickStep(Step):
         if len(self.gathering.names) < len(self.base.ids):
             return tr("Click {paint}, or drag over it.", paint=self._paint())
         if self._wrong:
-            return tr("Choose {wrong} and click its paint.", wrong=self._wrong)
+            return tr("Choose {marker} and click its paint.", marker=self._wrong)
         if not self.gathering.enough:
             return tr("Move and turn the hand slowly, near and far.")
         return tr("Enough: press Next.")
@@ -198,8 +198,8 @@ class PickStep(Step):
 
     def _hint(self) -> str:
         if self._wrong:
-            return tr("{wrong} cannot stay so: choose its line and click its paint, or press Ctrl+Z.",
-                      wrong=self._wrong)
+            return tr("{marker} cannot stay so: choose its line and click its paint, or press Ctrl+Z.",
+                      marker=self._wrong)
         if self.gathering.names and not len(self.gathering.skin):
             return tr("Pick bare skin too: then it is said whether a marker looks like it.")
         drift = () if self.gathering.names else drift_of(self._masked)
