@@ -24,6 +24,7 @@ from rhot_node.detect.coverage import (
 )
 from rhot_node.detect.follow import learn_noise
 from rhot_node.detect.image import GREY, table_of
+from rhot_node.detect.track import GROWTH_MAX
 
 ATTEMPTS = 5  # windows and levels tried before the marker counts as lost
 LEVEL_TOLERANCE = 0.08  # a local level further off than this from the assumed one is used for another attempt
@@ -192,7 +193,8 @@ def _choose(components, count, request, own, result):
     """Mark the component nearest to the hypothesis, and its fragments, in `own`; return the former.
 
     Pieces of a marker that a finger crosses count as one: those with which the area is nearer to that of the whole, by
-    its logarithm, than without. Beside a whole marker, what has its colour is another object.
+    its logarithm, than without, and no larger than the marker may have become since the last frame. Anything else of
+    its colour is another object.
     """
     best = 0
     best_cost = np.inf
@@ -203,6 +205,7 @@ def _choose(components, count, request, own, result):
             best, best_cost = number, cost
     own[best] = True
     total = components[best].area
+    largest = request.area * np.exp(GROWTH_MAX)
     reach = FRAGMENT_REACH * 2.0 * np.sqrt(request.area / np.pi)
     fragments = 1
     rival_cost = np.inf
@@ -212,9 +215,10 @@ def _choose(components, count, request, own, result):
         component = components[number]
         away = np.hypot(component.sum_x / component.area - request.x,
                         component.sum_y / component.area - request.y)
-        if away < reach and total * (total + component.area) < request.area ** 2:
+        joined = total + component.area
+        if away < reach and joined < min(largest, request.area ** 2 / total):
             own[number] = True
-            total += component.area
+            total = joined
             fragments += 1
         else:
             rival_cost = min(rival_cost, _cost(component, request))

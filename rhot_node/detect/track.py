@@ -155,7 +155,7 @@ def widen_band(axis_x, axis_y, breadth, report):
 MEMORY_FRAMES = 40  # for which a lost marker's size and velocity are kept
 VELOCITY_GAIN = 0.7
 AREA_GAIN = 0.4  # per frame, of the expected log area and of its trend
-COVERED = 0.5  # of the shift of the centroid by a cover: what the centroid may be off it, so that a cover explains both
+COVERED = 0.5  # of a cover's shift of the centroid: midway to a turn, which does not shift it, so neither is favoured
 GROWTH_MAX = 0.1  # of log area per frame: 2 m/s of approach at 1 m, at 40 frames/s
 PARTIAL_AREA = 0.82  # of the expected area: less is half hidden
 BROKEN_AREA = 0.93  # of the expected area: a band with less whose rims no longer fit is half hidden
@@ -377,7 +377,12 @@ def cover_of(track, place, moments):
     """What the change of a marker's moments (xx, xy, yy, without blur) says: a `Cover`.
 
     A marker that turns away and one that is covered both lose area in one direction. They differ by their centroid: of
-    the former it goes on as it moved, of the latter it is drawn from the cover by just as much as it lost.
+    the former it goes on as it moved, of the latter it is drawn from the cover by just as much as it lost. With d the
+    way of the centroid off its motion, px, and s the shift that a cover of this loss makes, a cover is what has
+
+        |d - s| < COVERED |s|
+
+    A turn has d = 0. What is off the motion in any other way is motion that the track does not know yet, no cover.
     """
     if not track.area > 0.0:
         return Cover(moments, 0.0, 0.0, 0.0)

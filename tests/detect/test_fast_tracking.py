@@ -9,6 +9,7 @@ from shipped_markers import RHOT6
 
 from rhot_node.detect.fast import FastDetector
 from rhot_node.detect.image import from_bgr
+from rhot_node.detect.track import cover_of, new_tracks
 from rhot_node.markers import MarkerSet
 from rhot_node.wire.messages import MarkerFlag, MarkerObservation
 
@@ -264,7 +265,8 @@ def test_a_marker_that_is_covered_slowly_from_one_side_is_half_hidden_not_farthe
         assert seen.flags & DOUBTS or cover < 22.0
 
 
-@pytest.mark.parametrize(("factor", "turned"), [(0.97, True), (0.97, False)])
+@pytest.mark.parametrize("factor", [0.99, 0.97, 0.95])
+@pytest.mark.parametrize("turned", [True, False])
 def test_a_marker_that_turns_away_is_plain(factor: float, turned: bool) -> None:
     """Its lengths shrink about a centroid that goes on as it moved."""
     detector = only("ring")
@@ -279,6 +281,19 @@ def test_a_marker_that_turns_away_is_plain(factor: float, turned: bool) -> None:
     assert flagged == 0
 
 
+@pytest.mark.parametrize(("drawn", "covered"), [(-1.0, True), (0.0, False), (0.4, False), (0.6, True), (1.0, True),
+                                                 (1.4, True), (1.6, False)])
+def test_a_cover_is_what_draws_the_centroid_more_than_half_as_far_as_it_should(drawn: float, covered: bool) -> None:
+    """A rectangle of 24 x 12 px loses a quarter of its length: 3 px of its centroid if that is covered."""
+    tracks, place = new_tracks(["disc"]), new_tracks(["disc"])
+    for name, value in {"area": 288.0, "alive": 1.0, "missed": 0.0, "m_xx": 48.0, "m_yy": 12.0, "vx": 2.0}.items():
+        tracks[name] = value
+    place["x"] = 2.0 + 3.0 * drawn
+    cover = cover_of(tracks[0], place[0], (27.0, 0.0, 12.0))
+    assert (cover.x, cover.y) == pytest.approx((math.copysign(3.0, drawn) if covered else 0.0, 0.0))
+    assert cover.moments == pytest.approx((48.0 if covered else 27.0, 0.0, 12.0))
+
+
 def test_beside_a_whole_marker_a_speck_of_its_colour_is_no_piece_of_it() -> None:
     rng, detector = np.random.default_rng(6), only("ring")
     for k in range(8):
@@ -288,3 +303,31 @@ def test_beside_a_whole_marker_a_speck_of_its_colour_is_no_piece_of_it() -> None
         seen = detector.detect(canvas.expose(rng))[0]
         assert not seen.flags & DOUBTS
         assert error(seen, 160.0, 120.0) < 0.1
+
+
+def test_half_a_marker_is_not_joined_with_a_large_thing_of_its_colour() -> None:
+    """Three fifths stay visible, right of a bar; left of that is a wall. Together they are half as large again."""
+    rng, detector = np.random.default_rng(9), only("ring")
+    marker = Canvas(320, 240).paint(disc(160, 120, 16), RGB["ring"], (160, 120), 19)
+    for _ in range(5):
+        whole = detector.detect(marker.expose(rng))[0]
+    marker.rgb[:, :151], marker.rgb[:, 151:158] = RGB["ring"], SKIN
+    seen = detector.detect(marker.expose(rng))[0]
+    assert seen.flags & DOUBTS
+    assert seen.diameter < whole.diameter
+    assert error(seen, 160.0, 120.0) < 2.5 * sigma(seen)
+
+
+@pytest.mark.parametrize("growth", [0.0, 0.05])
+@pytest.mark.parametrize("at", [155, 160, 164])
+def test_the_two_parts_of_a_marker_beside_a_thin_bar_are_one(at: int, growth: float) -> None:
+    rng, detector = np.random.default_rng(10), only("ring")
+    for k in range(8):
+        radius = 16.0 * math.exp(0.5 * growth * k)
+        canvas = Canvas(320, 240).paint(disc(160, 120, radius), RGB["ring"], (160, 120), radius + 3)
+        if k == 7:
+            canvas.rgb[:, at - 3:at + 3] = SKIN
+        seen = detector.detect(canvas.expose(rng))[0]
+    assert seen.flags & MarkerFlag.PARTIAL
+    assert error(seen, 160.0, 120.0) < 2.0
+    assert seen.diameter > 1.6 * radius  # of 2 without the bar; the larger part alone has less

@@ -16,6 +16,7 @@ from rhot_node.wire.messages import MarkerObservation
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "trifinger_cube"
 CUBE = load_markers(resource_path("markers", "trifinger_cube.json"))
 CAMERAS = (60, 180, 300)
+FAR_PX, FAR_SHARE = 8.0, 0.05
 
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"real images are not there ({FOLDER})")
 
@@ -68,19 +69,25 @@ def test_a_face_does_not_jump_while_the_picture_moves() -> None:
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_a_face_that_a_bar_crosses_is_not_called_plain_far_off(camera: int) -> None:
-    """The bar hides up to half of a face, by 5 px a frame: see `benchmarks/moved_cube.py`."""
+    """The bar hides up to half of a face, and moves by 5 px a frame: see `benchmarks/moved_cube.py`.
+
+    `FAR_SHARE` is what lies beyond the 95th percentile that it prints. Of 180 observations a camera, 15, 13 and 14
+    were far (8 %) while every cover counted as a turn, and 7 at most (4 %) are now that the two are told apart.
+    """
     bgr = cv2.imread(str(FOLDER / f"camera{camera}.png"))
     assert bgr is not None
-    rng, detector, first, far = np.random.default_rng(0), FastDetector(CUBE), dict[int, MarkerObservation](), 0
+    rng, detector, first = np.random.default_rng(0), FastDetector(CUBE), dict[int, MarkerObservation]()
+    far: list[bool] = []
     for start in range(150, 450, 5):
         covered = bgr.astype(np.float64)
         covered[:, start:start + 36] = (90, 120, 160)
         noisy = np.clip(covered + rng.normal(0.0, 3.0, bgr.shape), 0, 255).astype(np.uint8)
         seen = detector.detect(from_bgr(noisy))[:len(CUBE.ids)]
         first = first or {mark.index: mark for mark in seen if mark_is_visible(mark, camera)}
-        far += sum(seen[index].found and not seen[index].flags & DOUBTFUL
-                   and np.hypot(seen[index].x - at.x, seen[index].y - at.y) > 8.0 for index, at in first.items())
-    assert far <= 9  # of 150 and more
+        far += [seen[index].found and not seen[index].flags & DOUBTFUL
+                and np.hypot(seen[index].x - at.x, seen[index].y - at.y) > FAR_PX for index, at in first.items()]
+    assert len(far) == 3 * 60
+    assert np.mean(far) < FAR_SHARE
 
 
 def mark_is_visible(mark: MarkerObservation, camera: int) -> bool:
