@@ -4680,6 +4680,46 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Wie gut dieses Rig ist, gemessen wie in der Arbeit, mit 95-%-Intervallen: fünf Minuten.</translation>
     </message>
     <message>
+        <source>Move the hand</source>
+        <translation>Die Hand bewegen</translation>
+    </message>
+    <message>
+        <source>Start the tracking and move the hand through both pictures, near and far.</source>
+        <translation>Die Verfolgung starten und die Hand durch beide Bilder bewegen, nah und fern.</translation>
+    </message>
+    <message>
+        <source>The calibration in force still holds, or too little of the hand was seen.</source>
+        <translation>Die geltende Kalibrierung stimmt noch, oder von der Hand war zu wenig zu sehen.</translation>
+    </message>
+    <message>
+        <source>Show the hand</source>
+        <translation>Die Hand zeigen</translation>
+    </message>
+    <message>
+        <source>Start the tracking of a bare hand by its contours. Spread and bend every finger, and turn the hand.</source>
+        <translation>Die Verfolgung einer bloßen Hand an ihren Konturen starten. Jeden Finger spreizen und beugen und die Hand drehen.</translation>
+    </message>
+    <message>
+        <source>Too little of the hand was seen.</source>
+        <translation>Von der Hand war zu wenig zu sehen.</translation>
+    </message>
+    <message>
+        <source>Start the tracking by landmarks. Show the open hand to two cameras for some seconds, and turn it.</source>
+        <translation>Die Verfolgung durch Landmarken starten. Die offene Hand einige Sekunden lang zwei Kameras zeigen und drehen.</translation>
+    </message>
+    <message>
+        <source>Two cameras have not yet seen enough of the hand.</source>
+        <translation>Zwei Kameras haben noch nicht genug von der Hand gesehen.</translation>
+    </message>
+    <message>
+        <source>Wave</source>
+        <translation>Winken</translation>
+    </message>
+    <message>
+        <source>Press Record, then wave your hand up and down before the cameras for 20 seconds.</source>
+        <translation>Aufnehmen drücken, dann die Hand 20 Sekunden lang vor den Kameras auf und ab bewegen.</translation>
+    </message>
+    <message>
         <source>brisk</source>
         <translation>flott</translation>
     </message>

@@ -19,12 +19,15 @@ SOURCES = [HERE.parents[1] / "rhot_app" / name for name in ("ui", "engine")]
 
 
 def shown_names() -> list[str]:
-    """Names of `rhot_app` outside of `ui` that the window translates: calibrations, motions, a hand's numbers."""
+    """What the window translates of the rest of `rhot_app`: calibrations, what they collect, motions, a hand's
+    numbers."""
     from rhot_app.calibration.registry import calibrations
     from rhot_app.handfit.quantities import GROUPS
     from rhot_app.ui.models.words import shipped_motions
 
+    collected = [part for wizard in calibrations() for part in wizard.collect]
     return [*(text for wizard in calibrations() for text in (wizard.title, wizard.meaning)),
+            *(text for part in collected for text in (part.title, part.sentence, getattr(part, "nothing", "")) if text),
             *(text for motion in shipped_motions() for text in (motion.name, motion.description)), *GROUPS]
 
 

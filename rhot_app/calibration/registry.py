@@ -1,7 +1,7 @@
 """What a calibration is, and all of them in the order in which a new rig needs them.
 
-The Calibrate menu, `rhot calibrate`, the wizards, a rig's history, its health and the documents' list read these
-records. No other list of calibrations exists. A record stands in a file of `rhot_app.calibration.kinds`, with the
+The Calibrate menu, `rhot calibrate`, the wizards, a rig's history and its health read these records. The code has no
+other list of calibrations. A record stands in a file of `rhot_app.calibration.kinds`, with the
 functions that it names. Those files import what computes inside their functions, so that menus and help stay fast.
 """
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 KINDS = "rhot_app.calibration.kinds"
 ORDER = ("camera", "lens", "stereo", "refined", "colours", "foreground", "adapted", "measured", "time", "depth",
          "bones", "filters", "alignment", "certificate")
-"""In which a new rig needs them; others follow by their names."""
+"""In which a new rig needs them; others, of tests, follow by their names."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,18 @@ figure once, ``propose`` a `rhot_app.calibration.proposal.Proposal` of the rig t
 
 To add one:
 
-1. write the file, its place in `rhot_app.calibration.registry.ORDER`, and a section with its title in
-   docs/guide/calibration.md, at the same place;
-2. what it collects is described by `rhot_app.calibration.collect`. Only if there is something of its own to show, leave
-   that out and write ``rhot_app/ui/wizards/NAME.py`` with ``make_wizard(context)``, which gives a
+1. write the file, its place in `rhot_app.calibration.registry.ORDER`, and at the same place a row and a section with
+   its title in docs/guide/calibration.md. Import what computes inside the functions: menus and help must stay fast.
+   Name each code of a finding in a test;
+2. run ``python resources/translations/update.py``, translate what is new in ``rhot_de.ts``, and run it again;
+3. `rhot_app.calibration.collect` describes what is collected: movements that are recorded, lengths that are measured,
+   or what the engine finds while it tracks. Only if there is something of its own to show, leave ``collect`` empty and
+   write ``rhot_app/ui/wizards/NAME.py`` with ``make_wizard(context)``, which gives a
    `framework.definition.Definition` of the steps and pages that are its own;
-3. test it as a person would: in tests/ui/wizards, `Hands` clicks and `FakeRigAsker` draws pictures. Run it once in
-   tests/ui/wizards/on_simulated_rig. ``hands.keep(NAME)`` takes a page's picture for the guide: open it.
+4. a command's word is one of its title, and its help ends with two examples: kinds/depth.py shows one in full;
+5. test it as a person would: in tests/ui/wizards, `Hands` clicks and `FakeRigAsker` draws pictures. Run it once in
+   tests/ui/wizards/on_simulated_rig, as a study with its row in CONTRIBUTING.md. ``hands.keep(NAME)`` takes a page's
+   picture for the guide where RHOT_UPDATE_SCREENSHOTS is 1: open it.
 
 A step (`framework.step.Step`) knows no widgets: its state, the sentence that says what to do now, the bars, whether it
 is done. `observe` looks at pictures in a worker's thread and changes nothing; `accept_observation` gets what it found.
