@@ -43,9 +43,12 @@ class Room:
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
-    """The detector is compiled at its first use, which no test should wait for."""
-    CameraEye(synthetic_rig().markers).look(Picture("left", np.full((480, 640, 3), 90, np.uint8), 1, 0, 0),
-                                            CameraSettings(), None)
+    """What looks at pictures is compiled at its first use, also what follows once a marker is found: no test should
+    wait for it."""
+    asker = FakeRigAsker(synthetic_rig())
+    eye = CameraEye(asker.rig.markers)
+    for number, picture in enumerate((painted(asker.rig), Room(asker).draw(asker.rig.nodes[0].node_id, 0.0))):
+        eye.look(Picture("left", picture, number, number * 30_000_000, 0), CameraSettings(), None)
 
 
 @pytest.fixture
