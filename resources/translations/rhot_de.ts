@@ -7079,5 +7079,13 @@ vor {reason}</translation>
         <source>It is back in force. What was there before stands first in the list now.</source>
         <translation>Sie gilt wieder. Was vorher da war, steht jetzt zuerst in der Liste.</translation>
     </message>
+    <message>
+        <source>The numerical code of other trackers and of calibrations could not be compiled, so that they begin slowly: {reason}</source>
+        <translation>Der Rechencode anderer Tracker und der Kalibrierungen ließ sich nicht übersetzen; sie beginnen deshalb langsam: {reason}</translation>
+    </message>
+    <message>
+        <source>The code of other trackers and of calibrations is being compiled in the background, once: {done} of {steps} steps. It yields to the tracking, and takes minutes.</source>
+        <translation>Der Rechencode anderer Tracker und der Kalibrierungen wird einmalig im Hintergrund übersetzt: {done} von {steps} Schritten. Er weicht der Verfolgung und braucht Minuten.</translation>
+    </message>
 </context>
 </TS>

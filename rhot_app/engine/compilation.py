@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
+from rhot_app.engine.status import Advice, advise
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig
 from rhot_node.compiled import ALL, VARIABLE, WINDOW, is_complete
@@ -80,8 +81,8 @@ class BackgroundCompilation:
     """Compiles everything that is not compiled yet."""
 
     def __init__(self, command: Sequence[str] = COMMAND) -> None:
-        self.sentence = ""
-        """Its progress, or why it failed; empty before and after it. Any thread may read it."""
+        self.advice: Advice | None = None
+        """Its progress, or why it failed; None before and after it. Any thread may read it."""
         self._command = command
         self._process: subprocess.Popen[str] | None = None
 
@@ -100,11 +101,11 @@ class BackgroundCompilation:
     def _watch(self, process: subprocess.Popen[str]) -> None:
         with process:
             reason = _follow(process, self._report)
-        self.sentence = ""
-        if process.returncode > 0:
-            self.sentence = (f"The numerical code of other trackers and of calibrations could not be compiled, so that "
-                             f"they begin slowly: {reason}")
+        self.advice = None if process.returncode <= 0 else advise(
+            "The numerical code of other trackers and of calibrations could not be compiled, so that they begin "
+            "slowly: {reason}", level="info", reason=reason)
 
     def _report(self, done: int, steps: int) -> None:
-        self.sentence = ("The code of other trackers and of calibrations is being compiled in the background, once: "
-                         f"{done} of {steps} steps. It yields to the tracking, and takes minutes.")
+        self.advice = advise("The code of other trackers and of calibrations is being compiled in the background, "
+                             "once: {done} of {steps} steps. It yields to the tracking, and takes minutes.",
+                             level="info", done=done, steps=steps)

@@ -159,7 +159,7 @@ def follow_compilation(compilation: BackgroundCompilation, controller: Controlle
     """Compile the rest of the numerical code once a rig is open, or nobody opens one, and say how far it is."""
     if not controller.working:
         compilation.start()
-    controller.background = compilation.sentence
+    controller.background = compilation.advice
 
 
 # -- what must be settled before Qt and OpenGL are imported ------------------------------------------------------------

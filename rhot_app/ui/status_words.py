@@ -52,7 +52,7 @@ def notices_of(controller: Controller) -> list[Notice]:
     if controller.twin_pace is not None and controller.running:
         notices.append(_pace_notice(controller.twin_pace))
     if controller.background and controller.opened is not None:
-        notices.append(Notice("info", controller.background))
+        notices.append(_advice_notice(controller.background))
     if all(notice.lasting for notice in notices):
         notices.append(Notice("info", _quiet_sentence(controller, in_order=not notices)))
     return notices

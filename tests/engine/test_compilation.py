@@ -75,16 +75,16 @@ def test_who_gives_up_ends_the_process() -> None:
 def test_the_rest_is_compiled_in_the_background_and_ends_with_the_window() -> None:
     compilation = BackgroundCompilation(program(WAITING))
     compilation.start()
-    eventually(lambda: "1 of 2" in compilation.sentence)
+    eventually(lambda: compilation.advice is not None and "1 of 2" in compilation.advice.text)
     compilation.close()
-    eventually(lambda: compilation.sentence == "")
+    eventually(lambda: compilation.advice is None)
     broken = BackgroundCompilation(program("print('rhot: no room'); raise SystemExit(2)"))
     broken.start()
-    eventually(lambda: "no room" in broken.sentence)
+    eventually(lambda: broken.advice is not None and "no room" in broken.advice.text)
     mark_complete(ALL)
     done = BackgroundCompilation(program("raise SystemExit(2)"))
     done.start()
-    assert done.sentence == ""
+    assert done.advice is None
 
 
 @pytest.mark.parametrize("settings", [TrackerSettings(), TrackerSettings(ik="dls"), TrackerSettings("estimator"),

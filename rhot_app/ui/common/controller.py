@@ -13,6 +13,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
+from rhot_app.engine.status import Advice
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.ui.backend.contract import Asker, Backend, Listener, Opened, TwinChoice, TwinPace
@@ -103,8 +104,8 @@ class Controller(QObject):
         self._job: Job | None = None
         self.busy: tuple[str, float] | None = None
         self.problem = ""
-        self.background = ""
-        """What is done beside the tracking, in a sentence."""
+        self.background: Advice | None = None
+        """What is done beside the tracking."""
         self._restarts: list[float] = []
         self._restarting = False
         self._was_running = False
