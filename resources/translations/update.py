@@ -23,7 +23,7 @@ def shown_names() -> list[str]:
     numbers."""
     from rhot_app.calibration.registry import calibrations
     from rhot_app.handfit.quantities import GROUPS
-    from rhot_app.ui.models.words import shipped_motions
+    from rhot_app.simulator.scene.shipped_motions import shipped_motions
 
     collected = [part for wizard in calibrations() for part in wizard.collect]
     return [*(text for wizard in calibrations() for text in (wizard.title, wizard.meaning)),

@@ -18,7 +18,6 @@ from rhot_app.errors import EngineError, SourceError
 from rhot_app.options import add_directory_argument, add_rig_argument, add_settings_argument
 from rhot_app.project import load_rig
 from rhot_app.ui.backend.contract import TwinChoice
-from rhot_app.ui.backend.session import Session
 from rhot_node.files import require_replaceable
 from rhot_node.terminal import add_examples, log_to_stderr
 
@@ -86,6 +85,8 @@ def open_window(args: argparse.Namespace, *, rig: Path | None, twin: TwinChoice 
     cap_software_gl()
     cap_heap()
     log_to_stderr()
+    from rhot_app.ui.backend.session import Session
+
     session = Session(args.directory)
     from rhot_app.ui.common.job import workers
 

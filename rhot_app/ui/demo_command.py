@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rhot_app.errors import SimulatorError
 from rhot_app.options import add_scene_argument, add_seed_argument, add_tracker_argument
+from rhot_app.simulator.scene.shipped_motions import shipped_motions
 from rhot_app.ui.app import add_window_arguments, open_window
 from rhot_app.ui.backend.contract import TwinChoice
-from rhot_app.ui.models.words import shipped_motions
 from rhot_node.terminal import add_examples
 
 

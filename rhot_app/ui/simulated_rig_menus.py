@@ -10,13 +10,13 @@ from PySide6.QtCore import QObject
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
+from rhot_app.simulator.scene.shipped_motions import shipped_motions
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.menu import Menu, literal
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
-from rhot_app.ui.models.words import shipped_motions
 
 TITLE = tr_noop("Simulated hand does")
 FIRST = {"still": tr_noop("Holds still"), "wave": tr_noop("Waves"), "brisk": tr_noop("Waves briskly"),

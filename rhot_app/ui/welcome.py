@@ -18,10 +18,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.simulator.scene.shipped_motions import shipped_motions
 from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.language import tr
-from rhot_app.ui.models.words import shipped_motions
 
 _TITLE_PT = 20.0
 _CARD_WIDTH_PX = 300

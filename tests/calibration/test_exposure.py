@@ -80,7 +80,8 @@ def as_set(settings: CameraSettings) -> YuvImage:
     ycc = colours_of(picture(), np.ones((120, 160), np.bool_))
     levels = np.minimum((ycc @ RGB_FROM_YCC.T).clip(0.0, 255.0) * (settings.gain or 1.0) ** (1.0 / GAMMA)
                         * developed.white, developed.full)
-    y, u, v = (np.clip(levels @ developed.mix.T + developed.offset, 0, 255).astype(np.uint8).T.reshape(3, 120, 160))
+    yuv = np.clip(levels @ np.transpose(developed.mix) + developed.offset, 0, 255).astype(np.uint8)
+    y, u, v = yuv.T.reshape(3, 120, 160)
     return YuvImage(np.kron(y, np.ones((2, 2), np.uint8)), u, v)
 
 

@@ -128,8 +128,10 @@ def open_and_close(window: MainWindow, opener: Opener, *, escape: bool) -> weakr
 
 
 def held(backend: LendingBackend) -> tuple[list[str], int]:
-    """Names of the threads, and how many clients nobody has closed."""
-    return sorted(thread.name for thread in threading.enumerate()), len(backend.missed)
+    """Names of the threads, without those of Qt's pool, which wait for the next work, and how many clients nobody has
+    closed."""
+    names = (thread.name for thread in threading.enumerate())
+    return sorted(name for name in names if not name.startswith("Dummy-")), len(backend.missed)
 
 
 def descriptors() -> list[str]:

@@ -14,12 +14,10 @@ from typing import Final
 import numpy as np
 
 from rhot_app.calibration.verdict import Grade
-from rhot_app.errors import RigError
 from rhot_app.hand.anthropometry import hand_length
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.ui.language import tr, tr_noop
-from rhot_node.files import read_json, resource_path
 from rhot_node.wire.messages import MarkerFlag
 
 
@@ -204,28 +202,6 @@ def hand_names(rig: Rig | None) -> tuple[str, ...]:
 def each_hand(state: HandState | None) -> list[HandState]:
     """The states of the hands that `state` tells of, the rig's `hand` first; none without a state."""
     return [hand for hand in (state, state.other if state is not None else None) if hand is not None]
-
-
-# -- motions of the simulated hand -------------------------------------------------------------------------------------
-
-@dataclass(frozen=True, slots=True)
-class MotionInfo:
-    """Name as the simulator takes it, and what the hand does."""
-
-    name: str
-    description: str
-
-
-def shipped_motions() -> list[MotionInfo]:
-    """All motions of resources/motions, by name; one that cannot be read is left out."""
-    found = []
-    for path in sorted(resource_path("motions").glob("*.json")):
-        try:
-            document = read_json(path, RigError)
-        except RigError:
-            continue
-        found.append(MotionInfo(path.stem, str(document.get("description", ""))))
-    return found
 
 
 # -- choice of the tracker ---------------------------------------------------------------------------------------------

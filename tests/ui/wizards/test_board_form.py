@@ -71,7 +71,7 @@ def test_the_board_is_confirmed_by_what_is_seen(scene):
     assert "Show the board" in step.view().sentence
     step.accept_observation(step.observe(scene.pictures()))
     view = step.view()
-    assert "left and right" in view.sentence and view.done
+    assert "left, right" in view.sentence and view.done
     dots = next(mark for mark in view.annotated["left"].overlay if isinstance(mark, Dots))
     corners = scene.board.object_points() @ scene.world_from_board[:3, :3].T + scene.world_from_board[:3, 3]
     expected = 530.0 * corners[:, :2] / corners[:, 2:] + [319.5, 239.5]

@@ -68,7 +68,7 @@ def hands(open_wizard, wrong_rig, scene):
 def test_from_the_board_to_a_saved_rig(hands, scene):
     scene.place(*PLACES[0])
     hands.type(hands.window.page.square, "25,0")
-    hands.until(lambda: hands.window.step.view().done and "left and right" in hands.sentence)
+    hands.until(lambda: hands.window.step.view().done and "left, right" in hands.sentence)
     hands.next()
     for count, place in enumerate(PLACES):
         scene.place(*place)

@@ -31,7 +31,7 @@ def test_cameras_are_put_together(simulated_rig, open_on_rig):
     hands = open_on_rig("stereo")
     simulated_rig.twin.show(BoardShow())
     hands.type(hands.window.page.square, "25")
-    hands.until(lambda: hands.sentence == "Seen by left and right: this is the board.", 60.0)
+    hands.until(lambda: hands.sentence == "Seen by left, right: this is the board.", 60.0)
     hands.keep("stereo-board")
     hands.next()
     hands.until(lambda: len(hands.window.step.views.shots) >= 9, 120.0)
