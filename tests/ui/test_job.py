@@ -184,10 +184,13 @@ raise SystemExit(leave(0))
 
 def test_work_that_never_ends_does_not_keep_the_app():
     program = ALONE + """
+begun = threading.Event()
 def never(progress):
+    begun.set()
     while True:
         time.sleep(1.0)
 Job(never, print, print).start()
+begun.wait()
 print("closing", flush=True)
 raise SystemExit(leave(5, 0.2))
 """
