@@ -125,8 +125,9 @@ class SeparationPage(Page):
             columns.append(Column(head, partial(self._text, number), roles=partial(self._roles, number)))
         self.table.show_records([(name, number, shares) for number, (name, shares) in
                                  enumerate(zip(names, result.separability.matrix.tolist(), strict=True))], columns)
-        header = self.table.horizontalHeader().sizeHint().height()
-        self.table.setFixedHeight(header + _ROW_PX * len(names) + 4)
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        self.table.setFixedHeight(header.sizeHint().height() + _ROW_PX * len(names) + 4)
 
     @staticmethod
     def _text(column: int, row: ColourShares) -> str:
