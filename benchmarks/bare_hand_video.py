@@ -27,7 +27,6 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")
 from bare_scenes import rig_of  # noqa: E402
 
 from rhot_app.articulated.bodies import hand_bodies  # noqa: E402
-from rhot_app.articulated.tracker import LayeredTracker  # noqa: E402
 from rhot_app.barehand.tracker import BareHandTracker  # noqa: E402
 from rhot_app.export.overlay import overlay  # noqa: E402
 from rhot_app.geometry.camera import CameraModel, intrinsics_row  # noqa: E402
@@ -37,6 +36,7 @@ from rhot_app.hand.skeleton import HandPose  # noqa: E402
 from rhot_app.handfit.session import HandFit  # noqa: E402
 from rhot_app.handfit.state import Anchor  # noqa: E402
 from rhot_app.project import CameraCalibration, Rig  # noqa: E402
+from rhot_app.tracking.kinds.templates import LayeredTrack, picture_frames  # noqa: E402
 from rhot_node.detect.foreground import learn_skin  # noqa: E402
 from rhot_node.pictures import open_video  # noqa: E402
 
@@ -104,7 +104,7 @@ def main() -> None:
     ways = ("contours", "contours and templates") if arguments.templates else ("contours",)
     for way in ways:  # from the same pose, in the same images
         tracker.start(begin, t_ns)
-        follow(tracker, cameras, films, points, arguments, way)
+        follow(rig, tracker, cameras, films, points, arguments, way)
 
 
 def pose_of(rig: Rig, images: list[np.ndarray], points: list[np.ndarray]) -> HandPose:
@@ -120,9 +120,9 @@ def pose_of(rig: Rig, images: list[np.ndarray], points: list[np.ndarray]) -> Han
     return fit.state.instants[0].pose
 
 
-def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[list[np.ndarray]],
+def follow(rig: Rig, tracker: BareHandTracker, cameras: list[CameraModel], films: list[list[np.ndarray]],
            points: list[dict[int, np.ndarray]], arguments: argparse.Namespace, way: str) -> None:
-    layered = None
+    layered, begun = None, False
     worst, median, pixels, away_mm = [], [], [], []
     for k in range(arguments.first, arguments.last):
         images, t_ns = [frames[k] for frames in films], round(1e9 * k / 30.0)
@@ -130,12 +130,16 @@ def follow(tracker: BareHandTracker, cameras: list[CameraModel], films: list[lis
         if way != "contours":  # the templates' update follows that of the contours, at the same instant
             if layered is None:
                 bodies, _ = hand_bodies(tracker.surface)
-                layered = LayeredTracker(bodies, tracker.model.limits, tracker.process, cameras, outline=False)
-                layered.filter = tracker.filter
-                layered.start(tracker.filter.newest.state, tracker.filter.newest.covariance, dict(enumerate(images)),
-                              t_ns)
-            else:
-                layered.see(dict(enumerate(images)), t_ns)
+                layered = LayeredTrack("hand", bodies, tracker.model.limits, tracker.process, cameras, outline=False)
+                begun = True
+            for frame in picture_frames(rig, images, [t_ns] * 2):
+                knot = tracker.filter.newest
+                gated = layered.gate(frame, knot.state, knot.covariance)
+                if not begun and gated.residual is not None:
+                    knot = tracker.filter.add(knot.t_s, [gated.residual, *gated.beside], (knot.state, knot.covariance),
+                                              gated.initial)
+                layered.learn(frame, knot.state, knot.covariance, begun)
+            begun = False
         state = tracker.state()
         if k not in points[0] or k not in points[1]:
             continue

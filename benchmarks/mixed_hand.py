@@ -38,11 +38,11 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "barehand")
 from bare_hand import CHI2_3, MOTIONS, mistaken  # noqa: E402
 from bare_scenes import DISTANCE_M, near, rig_of  # noqa: E402
 from landmark_detector import Hand, detected_landmarks  # noqa: E402
-from pictures import picture, two_cameras, wall  # noqa: E402
+from pictures import capsules_of, picture, two_cameras, wall  # noqa: E402
 from shipped_rig import RIGHT_HAND  # noqa: E402
 
 from rhot_app.barehand.start import start_pose_file  # noqa: E402
-from rhot_app.barehand.surface import capsules_of, ray_to_capsule, surface_of  # noqa: E402
+from rhot_app.barehand.surface import ray_to_capsule, surface_of  # noqa: E402
 from rhot_app.evaluation.contour_tracker import FIRST_NS, PERIOD_NS, SearchedNodes  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
 from rhot_app.hand.kinematics import forward  # noqa: E402

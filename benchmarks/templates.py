@@ -28,13 +28,12 @@ sys.path[:0] = [str(ROOT), *(str(ROOT / "tests" / name) for name in ("", "bareha
 
 from bare_scenes import model_and_surface  # noqa: E402
 from depth_buffer import depth_labels  # noqa: E402
-from objects import object_of  # noqa: E402
+from objects import Followed, object_of  # noqa: E402
 from painted_object import meshes_of, picture, waves  # noqa: E402
 from pictures import look_at, wall  # noqa: E402
 from shipped_rig import RIGHT_HAND  # noqa: E402
 
 from rhot_app.articulated.bodies import ANGLES, camera_rays, hand_bodies, place  # noqa: E402
-from rhot_app.articulated.tracker import ConstantVelocity, LayeredTracker, free_of, rest_of  # noqa: E402
 from rhot_app.articulated.visibility import segment, visibility  # noqa: E402
 from rhot_app.export.layers_picture import draw_layers  # noqa: E402
 from rhot_app.geometry.camera import CameraModel  # noqa: E402
@@ -48,6 +47,12 @@ from rhot_app.simulator.bare_hand.skin import skin_colours  # noqa: E402
 from rhot_app.simulator.bare_hand.surface import build_surface  # noqa: E402
 from rhot_app.simulator.render.exposure_samples import FrameTime, Shutter  # noqa: E402
 from rhot_app.simulator.render.painter import lit_image  # noqa: E402
+from rhot_app.tracking.kinds.templates import (  # noqa: E402
+    ConstantVelocity,
+    LayeredTrack,
+    free_of,
+    rest_of,
+)
 
 CURL_HZ = 15.0
 SAME_M = 1e-6
@@ -71,12 +76,14 @@ def crossing(seeds: int, texture: float = 0.15, frames: int = 61) -> None:
         images = [picture(model, meshes, root, np.radians(curling(k / CURL_HZ)), camera, background, 100 * seed + k)
                   for k in range(frames)]
         for layered in (True, False):
-            tracker = LayeredTracker(bodies, model.limits, ConstantVelocity(free_of(model), pace_hz=0.75), [camera],
-                                     layered=layered, backgrounds=[empty])
-            tracker.start(*tracker.process.start(root, np.radians(curling(0.0))), {0: images[0]}, 0)
+            process = ConstantVelocity(free_of(model), pace_hz=0.75)
+            track = LayeredTrack("fingers", bodies, model.limits, process, [camera], layered=layered,
+                                 backgrounds=[empty])
+            scene = Followed(track, [camera])
+            scene.start(process.start(root, np.radians(curling(0.0))), [images[0]])
             errors, begun = [], time.process_time()
             for k in range(1, frames):
-                state = tracker.see({0: images[k]}, round(1e9 * k / CURL_HZ)).state
+                state = scene.see([images[k]], round(1e9 * k / CURL_HZ))
                 errors.append(np.degrees(state[ANGLES:ANGLES + 4]) - curling(k / CURL_HZ))
             spent = 1e3 * (time.process_time() - begun) / (frames - 1)
             rms = np.sqrt(np.mean(np.square(errors), axis=0))
@@ -146,14 +153,14 @@ def textured_hand(source: Turning, seed: int) -> BareHand:
 
 
 def filmed(painters: list[BareHandPainter], walls: list[np.ndarray], source: Turning, t_s: float,
-           seed: int) -> dict[int, np.ndarray]:
-    shutter, out = Shutter(4e-3, 0.0), {}
+           seed: int) -> list[np.ndarray]:
+    shutter, out = Shutter(4e-3, 0.0), []
     for c, painter in enumerate(painters):
         lit = lit_image(walls[c], np.ones(3))
         painter.paint(lit, source, FrameTime(shutter, lit.image.shape[1], t_s), 0)
         noise = np.random.default_rng([seed, c]).normal(0.0, 2.0, lit.image.shape[1:])
         smooth = cv2.GaussianBlur(lit.image.transpose(1, 2, 0), (0, 0), 0.7) + noise[..., None]
-        out[c] = np.clip(smooth + 0.5, 0.0, 255.0).astype(np.uint8)
+        out.append(np.clip(smooth + 0.5, 0.0, 255.0).astype(np.uint8))
     return out
 
 
@@ -174,16 +181,17 @@ def turning(seconds: float, seed: int = 1, outline: bool = False, amplitude_deg:
     natural = pose_prior()
     process = HandProcess(surface.dh, model.limits, natural.mean, np.asarray(np.linalg.inv(natural.information)),
                           PALM_SPREAD, np.full(3, FASTEST), FASTEST, np.zeros((0, 3, 3)), 1.0)
-    tracker = LayeredTracker(bodies, model.limits, process, cameras, outline=outline, backgrounds=empty)
+    track = LayeredTrack("hand", bodies, model.limits, process, cameras, outline=outline, backgrounds=empty)
+    scene = Followed(track, cameras)
     away, spent = [], 0.0
     for k in range(round(seconds * rate_hz)):
         images = filmed(painters, walls, source, k / rate_hz, k)
         world, angles = (one[0] for one in source.sample(np.array([k / rate_hz])))
         if k == 0:
-            tracker.start(*process.start(world, angles, (1e-3, 0.01)), images, 0)
+            scene.start(process.start(world, angles, (1e-3, 0.01)), images)
             continue
         begun = time.process_time()
-        state = tracker.see(images, round(1e9 * k / rate_hz)).state
+        state = scene.see(images, round(1e9 * k / rate_hz))
         spent += time.process_time() - begun
         found = pose_of(state).world_from_palm
         joints = [forward(model, HandPose(*pose)).joints
@@ -191,10 +199,10 @@ def turning(seconds: float, seed: int = 1, outline: bool = False, amplitude_deg:
         away.append(1e3 * (joints[0] - joints[1]))
         if show is not None and k % 10 == 0:
             drawn = [draw_layers(images[c], bodies, place(bodies, found, state[ANGLES:ANGLES + 21]), camera,
-                                 tracker.views[c].rays) for c, camera in enumerate(cameras)]
+                                 track.views[c].rays) for c, camera in enumerate(cameras)]
             cv2.imwrite(str(show / f"turning_{k:04d}.png"), np.hstack([images[0], *drawn])[100:, :, ::-1])
             tips = np.linalg.norm(away[-1], axis=1)[[0, 4, 8, 12, 16, 20]]
-            print(k, np.round(tips, 1), len(tracker.templates.templates), flush=True)
+            print(k, np.round(tips, 1), len(track.templates.templates), flush=True)
     away = np.array(away)
     errors = np.linalg.norm(away, axis=2)
     way = f"to and fro by {amplitude_deg:.0f} degrees" if amplitude_deg else "on and on"
@@ -212,7 +220,7 @@ def turning(seconds: float, seed: int = 1, outline: bool = False, amplitude_deg:
         drift = np.linalg.norm(away[-turn:].mean(axis=0) - away[:turn].mean(axis=0), axis=1)
         print(f"drift of the joints over {len(away) / rate_hz:.0f} s, mm: median {np.median(drift):.2f}, worst "
               f"{drift.max():.2f}, wrist {drift[0]:.2f}")
-    print(f"templates {len(tracker.templates.templates)}, processor time {1e3 * spent / max(len(errors), 1):.0f} ms a "
+    print(f"templates {len(track.templates.templates)}, processor time {1e3 * spent / max(len(errors), 1):.0f} ms a "
           "frame")
 
 

@@ -145,13 +145,6 @@ def _layered(dh: DhArrays, row: Indices, kind: Indices, ends: Array, radii: Arra
                   hinge, np.searchsorted(layer, np.arange(count + 1)))
 
 
-def root_of(state: Array) -> Array:
-    """(4, 4) world_from_root of a state (12 + A + ...,)."""
-    root = np.eye(4)
-    root[:3] = state[:ANGLES].reshape(3, 4)
-    return root
-
-
 def place(bodies: Bodies, root: Array, angles: Array) -> Placed:
     """The bodies of an object at `root` (4, 4) with `angles` (A,) rad."""
     placed = Placed(np.ascontiguousarray(root), np.empty((len(bodies.dh.parent), 3, 4)), np.empty_like(bodies.ends),

@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
-from rhot_app.articulated.bodies import ANGLES, ROOT_POSE, Bodies, Placed, place, root_of
-from rhot_app.articulated.templates import Filtered, Kind, Template, noise_gain
+from rhot_app.articulated.bodies import ANGLES, ROOT_POSE, Bodies, Placed, place
+from rhot_app.articulated.templates import Filtered, ImageFilter, Template, noise_gain
 from rhot_app.articulated.visibility import NONE, front_layers
 from rhot_app.barehand.contour_residual import DEGREES, SHAPE_SD_M
 from rhot_app.barehand.contours import STEP_M
+from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import UNIT, Rows, compressed
 from rhot_app.geometry.camera import CameraRecord, project_with_slope, scales_of
 from rhot_app.hand.kinematics import chain_row
@@ -74,7 +75,7 @@ class LayeredFrame:
     camera: CameraRecord
     image: Filtered
     templates: list[Template]
-    kind: Kind
+    kind: ImageFilter
     sigma_px: float
     level: int
     noise: float
@@ -88,7 +89,7 @@ class LayeredFrame:
     def linearise(self, state: Array) -> Rows:
         """6 + A rows with the information of all points, and one with the rest of their cost."""
         size, count = len(self.spread), len(self.bodies.layer_row)
-        placed = place(self.bodies, root_of(state), state[ANGLES:ANGLES + size - ROOT_POSE])
+        placed = place(self.bodies, pose_matrix(state), state[ANGLES:ANGLES + size - ROOT_POSE])
         frames = np.concatenate([placed.frames, placed.root[None, :3]])[self.bodies.layer_row]
         normal = _Normal(np.zeros((size, size)), np.zeros(size))
         self.used, self.held, shown = np.zeros(count, np.int64), np.zeros(count, np.int64), {}
@@ -241,10 +242,3 @@ def chain_rows(dh, root, frames, layer_rows, points, gradients):
     for k in range(len(points)):
         chain_row(dh, root, frames, layer_rows[k], points[k, 0], points[k, 1], points[k, 2], gradients[k], out[k])
     return out
-
-
-def layer_covariance(bodies: Bodies, placed: Placed, layer: int, point: Array, covariance: Array) -> Array:
-    """(3, 3) m^2, world: of a `point` (3,) of a layer, world, by that of root and angles (P, P)."""
-    rows = chain_rows(bodies.dh, placed.root, placed.frames, np.full(3, bodies.layer_row[layer]),
-                      np.tile(point, (3, 1)), np.eye(3))
-    return np.asarray(rows @ covariance @ rows.T)

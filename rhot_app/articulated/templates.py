@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 Image = NDArray[np.uint8]
 Filtered = NDArray[np.float32]
 
-Kind = Literal["raw", "log"]
+ImageFilter = Literal["raw", "log"]
 
 SIGMAS_PX = (4.0, 2.0, 1.0)
 """px: smoothing of images and templates, one after the other: the first widens the range of convergence, the last is
@@ -47,14 +47,14 @@ CONTRAST = 3.0
 """Standard deviations of noise that a template's texture must have: less would be noise in 1 of 400."""
 
 
-def filtered(image: Image, kind: Kind, sigma_px: float) -> Filtered:
+def filtered(image: Image, kind: ImageFilter, sigma_px: float) -> Filtered:
     """(H, W) the luma of an image (H, W, 3) RGB, smoothed; ``log``: its Laplacian of Gaussian times sigma squared,
     which brightness does not change."""
     luma = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype(np.float32)
     return _apply(luma, kind, sigma_px)
 
 
-def _apply(luma: Filtered, kind: Kind, sigma_px: float) -> Filtered:
+def _apply(luma: Filtered, kind: ImageFilter, sigma_px: float) -> Filtered:
     smooth = cv2.GaussianBlur(luma, (0, 0), sigma_px, borderType=cv2.BORDER_REPLICATE)
     if kind == "raw":
         return np.asarray(smooth, np.float32)
@@ -62,7 +62,7 @@ def _apply(luma: Filtered, kind: Kind, sigma_px: float) -> Filtered:
 
 
 @lru_cache
-def noise_gain(kind: Kind, sigma_px: float) -> float:
+def noise_gain(kind: ImageFilter, sigma_px: float) -> float:
     """Standard deviation of filtered noise, of that of the pixels."""
     size = 2 * int(6.0 * sigma_px) + 3
     impulse = np.zeros((size, size), np.float32)
@@ -95,7 +95,7 @@ class TemplateSet:
     """All templates of an object. `kind` and `sigmas_px`: how images are filtered. `refused`: by layer, why its last
     view gave no template."""
 
-    kind: Kind = "raw"
+    kind: ImageFilter = "raw"
     sigmas_px: tuple[float, ...] = SIGMAS_PX
     templates: list[Template] = field(default_factory=list)
     refused: dict[int, str] = field(default_factory=dict)

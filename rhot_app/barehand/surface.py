@@ -21,7 +21,7 @@ from rhot_app.estimation.vectors import dot, minus, norm, turned
 from rhot_app.hand.dh import ROOT, DhArrays
 from rhot_app.hand.kinematics import forward_arrays
 from rhot_app.hand.model import HandModel
-from rhot_app.hand.motion.hand_state import SHAPE, STATE
+from rhot_app.hand.motion.hand_state import STATE
 from rhot_app.hand.shape import FLESH
 from rhot_app.hand.skeleton import FINGERS
 
@@ -181,12 +181,6 @@ def posed(surface, world, angles, shape):
 def posed_in(surface, state):
     """The `Posed` surface of the hand in a state that has a shape."""
     return posed(surface, pose_matrix(state), state[STATE.angles], state[STATE.shape])
-
-
-def capsules_of(surface: Surface, world: Array, angles: Array, shape: Array | None = None) -> tuple[Array, Array]:
-    """`centres` (N, 2, 3) m and `radii` (N, 2) m of a posed hand: `world` (4, 4), `angles` (21,) rad."""
-    hand = posed(surface, world, angles, np.zeros(SHAPE) if shape is None else shape)
-    return hand.centres, hand.radii
 
 
 @njit(cache=True, inline="always")  # the test of most capsules is shorter than a call

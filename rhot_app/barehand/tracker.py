@@ -38,7 +38,7 @@ from rhot_app.barehand.start import (
 )
 from rhot_app.barehand.surface import FOREARM_RADIUS, HAND_SIZE, PALM, THICKNESS, surface_of
 from rhot_app.errors import TrackingError
-from rhot_app.estimation.filter import Knot, Partial, update
+from rhot_app.estimation.filter import Estimate, Knot, Partial, refined
 from rhot_app.estimation.residual import Residual
 from rhot_app.estimation.track import TrackFilter
 from rhot_app.geometry.camera import CameraModel
@@ -243,15 +243,11 @@ class BareHandTracker:
               extra: Sequence[Residual] = ()) -> Knot:
         """Update the state at `t_s`, s since the start, by `extra` residuals and the `contours` of each pass, by its
         number and the `state` (n,) so far. Raises LinAlgError when the observations contradict the estimate."""
-        residuals: list[Residual] = []
-        velocity = velocity_of(prediction)
-        for number in range(passes):
-            frames = contours(number, state)
-            residuals = [Contours(frames, velocity), *self.constraints, *extra]
-            if number < passes - 1:
-                better = update(self.process, t_s, prediction, residuals, state, self.filter.partial)
-                state, velocity = better.state, velocity_of((better.state, better.covariance))
-        return self.filter.add(t_s, residuals, prediction, state)
+        def observe(number: int, about: Array, estimate: Estimate) -> list[Residual]:
+            return [Contours(contours(number, about), velocity_of(estimate)), *self.constraints, *extra]
+
+        state, estimate = refined(self.process, t_s, prediction, passes - 1, observe, state, self.filter.partial)
+        return self.filter.add(t_s, observe(passes - 1, state, estimate), prediction, state)
 
     def prepare_update(self, cameras: Iterable[int], t_s: float) -> None:
         """Prepare for an update at `t_s`, s since the start, by images of `cameras`: how many correlated images count

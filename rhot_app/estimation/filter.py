@@ -7,7 +7,7 @@ Cathey 1993). Observations that arrive late are put in their place, and the knot
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -20,6 +20,9 @@ from rhot_app.estimation.linear import substitute
 from rhot_app.estimation.residual import Process, Residual, stack
 
 Array = NDArray[np.float64]
+Estimate = tuple[Array, Array]
+"""A state and its covariance."""
+
 Indices = NDArray[np.int64]
 
 ITERATIONS = 3
@@ -58,6 +61,21 @@ class Knot:
     residuals: list[Residual] = field(default_factory=list)
     weights: Array = field(default_factory=lambda: np.empty(0))
     label: Any = None
+
+
+def refined(process: Process, t_s: float, prediction: Estimate, passes: int,
+            observe: Callable[[int, Array, Estimate], list[Residual]], initial: Array | None = None,
+            partial: Partial = ALL) -> tuple[Array, Estimate]:
+    """The state after updates of one `prediction` in `passes`, and its estimate; before any, `initial` and the
+    prediction.
+
+    Each pass has the residuals that `observe` finds, by its number, about the state so far, and with its estimate.
+    """
+    state, estimate = prediction[0] if initial is None else initial, prediction
+    for number in range(passes):
+        knot = update(process, t_s, prediction, observe(number, state, estimate), state, partial)
+        state, estimate = knot.state, (knot.state, knot.covariance)
+    return state, estimate
 
 
 class IteratedFilter:

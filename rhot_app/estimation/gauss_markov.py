@@ -3,6 +3,7 @@
 A Matérn process of smoothness 5/2 with rate `rate` (1/s) and variance s^2 is the solution of a third-order stochastic
 differential equation: value, velocity and acceleration. `matern52` is its transition. `integrated` is the transition of
 a value without a mean whose velocity is a Matérn process of smoothness 3/2: a position that may go anywhere.
+`white_acceleration` is the noise of a value whose velocity is constant but for that.
 """
 
 from __future__ import annotations
@@ -17,6 +18,16 @@ Array = NDArray[np.float64]
 
 _POINTS = 0.5 + 0.5 * np.array([-math.sqrt(0.6), 0.0, math.sqrt(0.6)])  # Gauss-Legendre on 0..1
 _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+
+
+def white_acceleration(density: Array, dt: float) -> Array:
+    """(2 n, 2 n) covariance of n values and of their n velocities after `dt` s by white accelerations of spectral
+    `density` (n,), squared units per s^3."""
+    count, out = len(density), np.zeros((2 * len(density), 2 * len(density)))
+    value, rate = np.arange(count), np.arange(count, 2 * count)
+    out[value, value], out[rate, rate] = density * dt**3 / 3.0, density * dt
+    out[value, rate] = out[rate, value] = density * dt**2 / 2.0
+    return out
 
 
 @njit(cache=True)

@@ -133,12 +133,6 @@ def log_so3(rotation: Array) -> Array:
     return np.array(rotation_vector(np.ascontiguousarray(rotation), np.eye(3)))
 
 
-def inverse_left_jacobian(vectors: Array) -> Array:
-    """(..., 3, 3) of rotation vectors (..., 3), to fourth order; that of -v is the inverse right Jacobian at v."""
-    cross = skew(vectors)
-    return np.asarray(np.eye(3) - 0.5 * cross + cross @ cross / 12.0)
-
-
 def skew(vectors: ArrayLike) -> Array:
     """(..., 3, 3) matrices whose product with u is the cross product of `vectors` (..., 3) and u."""
     x, y, z = np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0)

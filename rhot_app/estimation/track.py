@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rhot_app.estimation.filter import IteratedFilter, Knot
+from rhot_app.estimation.filter import Estimate, IteratedFilter, Knot
 from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Process, Residual, stack
 
@@ -153,7 +153,7 @@ class TrackFilter(IteratedFilter):
         """Whether `t_ns` is before the oldest knot."""
         return self.seconds(t_ns) < self.knots[0].t_s
 
-    def predict_ns(self, t_ns: int) -> tuple[Array, Array]:
+    def predict_ns(self, t_ns: int) -> Estimate:
         """`predict` at master time `t_ns`."""
         return self.predict(self.seconds(t_ns))
 

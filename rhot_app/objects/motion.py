@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.estimation.gauss_markov import white_acceleration
 from rhot_app.estimation.layout import SE3, Layout, pose_matrix
 from rhot_app.estimation.residual import UNIT, Rows, student
 from rhot_app.estimation.se3 import PoseState, difference, exponential, pose_difference, retract
@@ -77,20 +78,15 @@ class ObjectProcess(PoseState):
 
     def predict(self, state: Array, covariance: Array, dt_s: float) -> tuple[Array, Array]:
         """State and covariance (12, 12) after `dt_s`."""
-        move = self.transition(state, dt_s)
-        noise = np.zeros((SIZE, SIZE))
+        move, density = self.transition(state, dt_s), np.empty(TWIST)
         for first, rest, start in zip((0, 3), REST_ACCELERATION, START_SPEED, strict=True):
             own = slice(first, first + 3)
             speed = state[VELOCITY][own]
             spread = np.trace(covariance[VELOCITY_ERROR, VELOCITY_ERROR][own, own])
             square = rest**2 + RATE**2 * (speed @ speed + min(spread, 3.0 * start**2))
-            density = 2.0 / RATE * square / 3.0
-            for axis in range(first, first + 3):
-                noise[axis, axis] = density * dt_s**3 / 3.0
-                noise[axis, axis + TWIST] = noise[axis + TWIST, axis] = density * dt_s**2 / 2.0
-                noise[axis + TWIST, axis + TWIST] = density * dt_s
+            density[own] = 2.0 / RATE * square / 3.0
         moved = retract(state, np.concatenate([dt_s * state[VELOCITY], np.zeros(TWIST)]))
-        return moved, move @ covariance @ move.T + noise
+        return moved, move @ covariance @ move.T + white_acceleration(density, dt_s)
 
     def transition(self, state: Array, dt_s: float) -> Array:
         """(12, 12) Jacobian of `predict`'s state by `state`."""

@@ -49,8 +49,17 @@ class MeasuredPose:
     covariance: Array
 
 
-ObjectFrame = FiducialFrame | MeasuredPose
-"""What is observed of objects beside the markers: tags of one frame, or one pose."""
+@dataclass(frozen=True, slots=True, eq=False)
+class PictureFrame:
+    """One frame of one camera as it is, `image` (H, W, 3) RGB, in master time. Its rows count as one instant."""
+
+    camera: int
+    t_row0_master_ns: int
+    image: NDArray[np.uint8]
+
+
+ObjectFrame = FiducialFrame | MeasuredPose | PictureFrame
+"""What is observed of objects beside the markers: tags of one frame, one pose, or a picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +75,10 @@ class MarkerPoints:
     ids: tuple[str, ...]
     pixels: Array
     covariances: Array
+
+
+FrameOfObjects = FiducialFrame | MarkerPoints | PictureFrame
+"""What one camera observes of objects."""
 
 
 @dataclass(frozen=True, slots=True)

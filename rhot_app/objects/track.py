@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics, Part
-from rhot_app.estimation.filter import FilteredState, Knot
+from rhot_app.estimation.filter import Estimate, FilteredState, Knot
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.quantiles import chi_squared
-from rhot_app.estimation.residual import Residual
+from rhot_app.estimation.residual import Process, Residual
 from rhot_app.estimation.se3 import difference
 from rhot_app.estimation.track import PREDICTED_NS, Life, TrackFilter
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.objects.motion import SIZE, TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior
 from rhot_app.objects.object_file import ObjectModel, require_distinct
-from rhot_app.objects.observations import FiducialFrame, MarkerPoints, ObjectPoints, ObjectView
+from rhot_app.objects.observations import FiducialFrame, FrameOfObjects, ObjectPoints, ObjectView, PictureFrame
 from rhot_app.objects.pose import (
     AMBIGUOUS,
     Mode,
@@ -65,10 +65,13 @@ EXCLUDED = -2.0 * math.log(FORGET)
 @dataclass(frozen=True, slots=True)
 class Gated:
     """A measurement's part that a prediction accepts: `residual`, None when it is rejected, and its -2 log likelihood
-    `cost` under the prediction."""
+    `cost` under the prediction. `beside`: residuals of the state that no measurement has. `initial` (n,): see
+    `estimation.filter.update`."""
 
     residual: Residual | None
     cost: float
+    beside: Sequence[Residual] = ()
+    initial: Array | None = None
 
 
 class Measurement(Protocol):
@@ -87,7 +90,7 @@ class Measurement(Protocol):
         """What a predicted state with covariance (12, 12) accepts of it."""
         ...
 
-    def pair(self, state: Array, prediction: tuple[Array, Array]) -> tuple[Mode, Mode] | None:
+    def pair(self, state: Array, prediction: Estimate) -> tuple[Mode, Mode] | None:
         """The estimate at `state` and another one that explains measurement and prediction; None without another."""
         ...
 
@@ -128,7 +131,7 @@ class PointMeasurement:
         cost = _innovation_cost(error[accepted].ravel(), whitened[accepted].reshape(2 * count, -1), covariance)
         return Gated(residual.only(accepted), cost + GATE_2 * (len(error) - count))
 
-    def pair(self, state: Array, prediction: tuple[Array, Array]) -> tuple[Mode, Mode] | None:
+    def pair(self, state: Array, prediction: Estimate) -> tuple[Mode, Mode] | None:
         """The estimate and its reversal, if the prediction does not exclude that: a tag's tilt may be taken for the
         opposite one as it goes through the frontal pose."""
         other = reversed_state(self._points, self._cameras, self._view, state)
@@ -158,8 +161,14 @@ class _Hypothesis:
 class ObjectTrack:
     """The track of one object: it appears, is lost, and returns."""
 
-    def __init__(self, name: str) -> None:
-        self.name, self._process = name, ObjectProcess()
+    def __init__(self, name: str, process: Process | None = None, velocity: slice = VELOCITY) -> None:
+        """`process`: of a state that begins with the object's pose, and has its `velocity`; a rigid object's by
+        default."""
+        self.name, self.velocity, self._process = name, velocity, process or ObjectProcess()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: a new session, or a node's clock was set."""
         self._hypotheses: list[_Hypothesis] = []
         self._life, self._rejected = Life(), 0
 
@@ -178,6 +187,9 @@ class ObjectTrack:
             return True
         self._rejected += 1
         return self._rejected >= REJECTIONS and self._start(measurement)
+
+    def ingest(self, frame: FrameOfObjects) -> None:
+        """Weigh what one frame has of the object; nothing where only poses come."""
 
     def predicts(self, measurement: Measurement) -> bool:
         """Whether a hypothesis accepts a measurement; False without a track."""
@@ -200,7 +212,7 @@ class ObjectTrack:
         elif self._life.predicted(t_ns):
             validity = Validity.PREDICTED
         return ObjectState(self.name, best.filter.time_ns(t_s), validity, pose_matrix(state),
-                           covariance[:TWIST, :TWIST], state[VELOCITY])
+                           covariance[:TWIST, :TWIST], state[self.velocity])
 
     def estimate(self) -> tuple[int, FilteredState] | None:
         """Master time, ns, and the most probable hypothesis after the newest measurement, labelled by its filter; None
@@ -238,15 +250,16 @@ class ObjectTrack:
             if gated.residual is None:
                 rejecting.append(hypothesis)
             else:
-                accepting.append((hypothesis, gated.residual, gated.cost, prediction))
-        least = min((cost for _, _, cost, _ in accepting), default=math.inf)
+                accepting.append((hypothesis, [gated.residual, *gated.beside], gated, prediction))
+        least = min((gated.cost for _, _, gated, _ in accepting), default=math.inf)
         kept: list[_Hypothesis] = []
-        for hypothesis, residual, cost, prediction in accepting:
+        for hypothesis, residuals, gated, prediction in accepting:
             try:
-                knot = hypothesis.filter.add(hypothesis.filter.seconds(measurement.t_ns), [residual], prediction)
+                knot = hypothesis.filter.add(hypothesis.filter.seconds(measurement.t_ns), residuals, prediction,
+                                             gated.initial)
             except np.linalg.LinAlgError:  # the estimate contradicts itself
                 continue
-            hypothesis.log_weight -= 0.5 * min(cost, least + REJECTION)
+            hypothesis.log_weight -= 0.5 * min(gated.cost, least + REJECTION)
             kept.append(hypothesis)
             if len(accepting) == 1 and not rejecting and knot is hypothesis.filter.newest:
                 kept += self._second(measurement, hypothesis, knot, prediction)
@@ -261,7 +274,7 @@ class ObjectTrack:
         return True
 
     def _second(self, measurement: Measurement, first: _Hypothesis, knot: Knot,
-                prediction: tuple[Array, Array]) -> list[_Hypothesis]:
+                prediction: Estimate) -> list[_Hypothesis]:
         """Another hypothesis that explains the measurement at `knot` as well, if there is one."""
         pair = measurement.pair(knot.state, prediction)
         if pair is None:
@@ -285,90 +298,91 @@ class ObjectTrack:
                 self._hypotheses.append(one)
 
 
-class ObjectTracker:
-    """Tracks several objects with the cameras of one rig. Cameras need no synchronisation."""
+class RigidTrack(ObjectTrack):
+    """The track of one object by its tags or markers, with the cameras of one rig."""
 
-    def __init__(self, objects: Sequence[ObjectModel], cameras: Sequence[CameraModel],
-                 diagnostics: Diagnostics | None = None, camera_names: Sequence[str] = ()) -> None:
-        """`diagnostics` takes what it fails over and warns of, by `camera_names`. Raises ObjectError when two objects
-        cannot be told apart."""
-        require_distinct(objects, [one.name for one in objects])
-        self._diagnostics = Diagnostics() if diagnostics is None else diagnostics
-        self._camera_names = camera_names or [str(number) for number in range(len(cameras))]
-        self._cameras = CameraArrays.of(list(cameras))
-        self._points = [ObjectPoints(one) for one in objects]
-        self._tracks = [ObjectTrack(one.name) for one in objects]
-        self._newest: list[dict[int, ObjectView]] = [{} for _ in objects]
-
-    def take(self, frame: FiducialFrame | MarkerPoints) -> list[ObjectState]:
-        """Weigh one frame; the state of every object after it, at the time of the object's points or of row 0."""
-        found = []
-        for number in range(len(self._tracks)):
-            t_ns = frame.t_row0_master_ns
-            with self._part(number):
-                t_ns = self._take(number, frame)
-            found.append(self._state(number, t_ns))
-        return found
-
-    def take_pose(self, name: str, measurement: Measurement) -> bool:
-        """Weigh a pose of the object `name`; whether it was accepted. One of an object that is not here is not."""
-        accepted = False
-        for number, track in enumerate(self._tracks):
-            if track.name == name:
-                with self._part(number):
-                    accepted |= track.take(measurement)
-        return accepted
-
-    def states(self, t_ns: int) -> list[ObjectState]:
-        """The state of every object at master time `t_ns`, by what has been taken."""
-        return [self._state(number, t_ns) for number in range(len(self._tracks))]
-
-    def estimates(self) -> list[tuple[int, FilteredState] | None]:
-        """Of every object, as `Track.estimate`."""
-        return [track.estimate() for track in self._tracks]
+    def __init__(self, model: ObjectModel, cameras: CameraArrays, diagnostics: Diagnostics,
+                 camera_names: Sequence[str]) -> None:
+        super().__init__(model.name)
+        self._points, self._cameras = ObjectPoints(model), cameras
+        self._diagnostics, self._camera_names = diagnostics, camera_names
 
     def reset(self) -> None:
-        """Forget everything: a new session, or a node's clock was set."""
-        self._tracks = [ObjectTrack(track.name) for track in self._tracks]
-        self._newest = [{} for _ in self._tracks]
+        """Forget everything."""
+        super().reset()
+        self._newest: dict[int, ObjectView] = {}
 
-    def _part(self, number: int, what: str = "the object") -> Part:
-        def restart() -> None:
-            self._tracks[number], self._newest[number] = ObjectTrack(name), {}
-        name = self._tracks[number].name
-        return self._diagnostics.part(f"{what} {name}", restart)
+    def ingest(self, frame: FrameOfObjects) -> None:
+        """See `ObjectTrack`."""
+        if isinstance(frame, PictureFrame):
+            return
+        chosen = self._chosen(frame) if isinstance(frame, FiducialFrame) else []
+        view = self._points.view(frame, chosen)
+        if view is not None:
+            others = [other for camera, other in self._newest.items()
+                      if camera != view.camera and abs(view.t_ns - other.t_ns) < PREDICTED_NS]
+            self._newest[view.camera] = view
+            self.take(PointMeasurement(self._points, self._cameras, view, others))
 
-    def _state(self, number: int, t_ns: int) -> ObjectState:
-        with self._part(number, "the state of the object"):
-            return self._tracks[number].state(t_ns)
-        return unknown_object(self._tracks[number].name, t_ns, Validity.LOST)
-
-    def _take(self, number: int, frame: FiducialFrame | MarkerPoints) -> int:
-        """Master time of the object's points, or of row 0 without any."""
-        track, newest = self._tracks[number], self._newest[number]
-        chosen = self._chosen(number, frame) if isinstance(frame, FiducialFrame) else []
-        view = self._points[number].view(frame, chosen)
-        if view is None:
-            return frame.t_row0_master_ns
-        others = [other for camera, other in newest.items()
-                  if camera != view.camera and abs(view.t_ns - other.t_ns) < PREDICTED_NS]
-        newest[view.camera] = view
-        track.take(PointMeasurement(self._points[number], self._cameras, view, others))
-        return view.t_ns
-
-    def _chosen(self, number: int, frame: FiducialFrame) -> list[int]:
+    def _chosen(self, frame: FiducialFrame) -> list[int]:
         """Of each tag that is seen more than once the copy that alone fits the prediction, if there is one."""
-        points, track, chosen = self._points[number], self._tracks[number], list[int]()
+        points, chosen = self._points, list[int]()
         for copies in points.copies(frame):
             fits = []
             for n in copies:
                 view = points.view(replace(frame, keys=frame.keys[[n]], corners=frame.corners[[n]],
                                            covariances=frame.covariances[[n]]))
-                if view is not None and track.predicts(PointMeasurement(points, self._cameras, view)):
+                if view is not None and self.predicts(PointMeasurement(points, self._cameras, view)):
                     fits.append(n)
             chosen += fits if len(fits) == 1 else []
-            self._diagnostics.warn(copies_sentence(self._camera_names[frame.camera], frame.keys[copies[0]], track.name))
+            self._diagnostics.warn(copies_sentence(self._camera_names[frame.camera], frame.keys[copies[0]], self.name))
         return chosen
+
+
+class ObjectTracker:
+    """Tracks several objects with the cameras of one rig. Cameras need no synchronisation."""
+
+    def __init__(self, objects: Sequence[ObjectModel], cameras: Sequence[CameraModel],
+                 diagnostics: Diagnostics | None = None, camera_names: Sequence[str] = (),
+                 further: Sequence[ObjectTrack] = ()) -> None:
+        """`diagnostics` takes what it fails over and warns of, by `camera_names`. `further`: tracks of other objects.
+        Raises ObjectError when two objects cannot be told apart."""
+        require_distinct(objects, [one.name for one in objects])
+        self._diagnostics = Diagnostics() if diagnostics is None else diagnostics
+        names, arrays = camera_names or [str(number) for number in range(len(cameras))], CameraArrays.of(list(cameras))
+        self.tracks = [*(RigidTrack(one, arrays, self._diagnostics, names) for one in objects), *further]
+
+    def take(self, frame: FrameOfObjects) -> None:
+        """Weigh one frame."""
+        for track in self.tracks:
+            with self._part(track):
+                track.ingest(frame)
+
+    def take_pose(self, name: str, measurement: Measurement) -> bool:
+        """Weigh a pose of the object `name`; whether it was accepted. One of an object that is not here is not."""
+        accepted = False
+        for track in self.tracks:
+            if track.name == name:
+                with self._part(track):
+                    accepted |= track.take(measurement)
+        return accepted
+
+    def states(self, t_ns: int) -> list[ObjectState]:
+        """The state of every object at master time `t_ns`, by what has been taken."""
+        return [self._state(track, t_ns) for track in self.tracks]
+
+    def reset(self) -> None:
+        """Forget everything: a new session, or a node's clock was set."""
+        for track in self.tracks:
+            track.reset()
+
+    def _part(self, track: ObjectTrack, what: str = "the object") -> Part:
+        return self._diagnostics.part(f"{what} {track.name}", track.reset)
+
+    def _state(self, track: ObjectTrack, t_ns: int) -> ObjectState:
+        with self._part(track, "the state of the object"):
+            return track.state(t_ns)
+        return unknown_object(track.name, t_ns, Validity.LOST)
 
 
 def copies_sentence(camera: str, key: NDArray[np.int64], name: str) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,12 +22,12 @@ from rhot_app.estimation.track import LOST_NS, PREDICTED_NS
 from rhot_app.geometry.camera import CameraModel
 from rhot_app.hand.model import HandModel, build_model
 from rhot_app.objects.contact import ContactMonitor, FingertipPads, fingertip_pads
-from rhot_app.objects.motion import TWIST, VELOCITY
+from rhot_app.objects.motion import TWIST
 from rhot_app.objects.observations import MarkerPoints, MeasuredPose, ObjectFrame
 from rhot_app.objects.shape import shape_of
 from rhot_app.objects.state import ObjectState, Validity, unknown_object
 from rhot_app.objects.stream import PoseMeasurement
-from rhot_app.objects.track import ObjectTracker
+from rhot_app.objects.track import ObjectTrack, ObjectTracker
 from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.tracking.markers.marker_model import scaled_table
@@ -39,16 +40,17 @@ Indices = NDArray[np.intp]
 class RigObjects:
     """The objects of a rig, and the contacts of its hands with them."""
 
-    def __init__(self, rig: Rig, diagnostics: Diagnostics) -> None:
-        """`diagnostics` takes what is failed over or ambiguous. Raises RigError when the mesh of an object cannot be
-        used."""
+    def __init__(self, rig: Rig, diagnostics: Diagnostics, articulated: Sequence[ObjectTrack] = ()) -> None:
+        """`diagnostics` takes what is failed over or ambiguous. `articulated`: tracks of objects that the rig does not
+        have, which follow its own. Raises RigError when the mesh of an object cannot be used."""
         cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
-        self._tracker = ObjectTracker(rig.models, cameras, diagnostics, [node.name for node in rig.nodes])
+        self._tracker = ObjectTracker(rig.models, cameras, diagnostics, [node.name for node in rig.nodes], articulated)
         ids, self._tracked_with = rig.markers.ids, rig.tracked_with
         worn = [marker.marker for model in rig.models for marker in model.markers]
         self._columns = np.array([ids.index(name) for name in worn], np.intp)
         self._ids = tuple(ids[column] for column in self._columns)
-        shapes = [shape_of(one.model, one.folder) for one in rig.objects if one.model is not None]
+        shapes = [*(shape_of(one.model, one.folder) for one in rig.objects if one.model is not None),
+                  *(None for _ in articulated)]
         hands = [build_model(hand) for hand in (rig.hand, rig.other_hand) if hand is not None]
         self._contacts = [_HandContacts(hand, [None if shape is None else ContactMonitor(hand, shape)
                                                for shape in shapes], diagnostics) for hand in hands]
@@ -60,7 +62,7 @@ class RigObjects:
             contacts.reset()
 
     def ingest(self, frame: ObjectFrame) -> None:
-        """Take the tags of one frame, or a pose of another tracker, in."""
+        """Take the tags of one frame, a pose of another tracker, or a picture in."""
         if isinstance(frame, MeasuredPose):
             self._tracker.take_pose(frame.name, PoseMeasurement(frame.t_ns, frame.world_from_object, frame.covariance))
         elif self._tracked_with[frame.camera]:
@@ -125,11 +127,11 @@ def _scaled(pads: FingertipPads, scale: float) -> FingertipPads:
 class SmoothedObjects(RigObjects):
     """Takes the frames of a recording; `states` then smooths: it uses later frames as well."""
 
-    def __init__(self, rig: Rig, diagnostics: Diagnostics) -> None:
+    def __init__(self, rig: Rig, diagnostics: Diagnostics, articulated: Sequence[ObjectTrack] = ()) -> None:
         """Raises RigError as `RigObjects`."""
-        super().__init__(rig, diagnostics)
+        super().__init__(rig, diagnostics, articulated)
         self._diagnostics = diagnostics
-        self._histories = [_History(model.name) for model in rig.models]
+        self._histories = [_History(track) for track in self._tracker.tracks]
 
     def ingest(self, frame: ObjectFrame) -> None:
         """See `RigObjects`."""
@@ -157,23 +159,26 @@ class SmoothedObjects(RigObjects):
         return found
 
     def _keep(self) -> None:
-        for history, found in zip(self._histories, self._tracker.estimates(), strict=True):
-            if found is not None:
-                history.add(*found)
+        for history in self._histories:
+            history.add()
 
 
 class _History:
     """Filtered estimates of one object, and the smoothed ones of those that are final. Times are s since the first."""
 
-    def __init__(self, name: str) -> None:
-        self.name, self.over = name, False
+    def __init__(self, track: ObjectTrack) -> None:
+        self.name, self._track, self.over = track.name, track, False
         self._filtered: list[FilteredState] = []
         self._smoothed: list[FilteredState] = []
         self._final_s = -math.inf
         self._first_ns: int | None = None
 
-    def add(self, t_ns: int, estimate: FilteredState) -> None:
-        """Keep a newer estimate than the last one."""
+    def add(self) -> None:
+        """Keep the track's estimate, if it is newer than the last one."""
+        found = self._track.estimate()
+        if found is None:
+            return
+        t_ns, estimate = found
         self._first_ns = t_ns if self._first_ns is None else self._first_ns
         t_s = 1e-9 * (t_ns - self._first_ns)
         if not self._filtered or t_s > self._filtered[-1].t_s:
@@ -195,7 +200,7 @@ class _History:
             return unknown_object(self.name, t_ns, Validity.LOST)
         state, covariance = here.process.predict(here.state, here.covariance, t_s - here.t_s)
         return ObjectState(self.name, t_ns, Validity.PREDICTED if late_ns > PREDICTED_NS else Validity.TRACKED,
-                           pose_matrix(state), covariance[:TWIST, :TWIST], state[VELOCITY])
+                           pose_matrix(state), covariance[:TWIST, :TWIST], state[self._track.velocity])
 
     def _smooth(self, t_s: float) -> None:
         """Smooth what there is, one run of one hypothesis after the other."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,9 @@ from rhot_app.barehand.start import LATERAL_M
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import RigError
 from rhot_app.estimation.track import NEVER, comes_late
-from rhot_app.objects.observations import FiducialFrame, MeasuredPose
+from rhot_app.objects.observations import ObjectFrame
 from rhot_app.objects.state import ObjectState
+from rhot_app.objects.track import ObjectTrack
 from rhot_app.project import Rig, estimator_obstacle, observation_obstacle
 from rhot_app.state import Condition, HandState, Knowledge, SeenContour, no_hand
 from rhot_app.tracking.classic import ClassicTracker
@@ -43,28 +44,28 @@ _OF_HANDS = "triangulate", "filter", "solve"
 """Stages of the latency that run for one hand after the other."""
 
 
-def make_tracker(rig: Rig, *, smooth: bool = False) -> Tracker:
+def make_tracker(rig: Rig, *, smooth: bool = False, articulated: Sequence[ObjectTrack] = ()) -> Tracker:
     """A new tracker for `rig`: its scene, or its only hand. `smooth`: one for recordings, whose states use all frames;
-    the rig's tracker must be one that smooths. Raises RigError when the estimator cannot work with its markers, cameras
-    or nodes, or the mesh of an object cannot be used."""
-    if smooth:
+    the rig's tracker must be one that smooths. `articulated`: tracks of objects that the rig does not have. Raises
+    RigError when the estimator cannot work with its markers, cameras or nodes, or the mesh of an object cannot be
+    used."""
+    if smooth or rig.tracker.kind != "classic":
         require_estimator(rig)
-        recorded = [(RecordingEstimator(own), columns) for own, columns in rigs_of_hands(rig)]
-        return SmoothedScene(rig, recorded)
+    alone, hands, images = rigs_of_hands(rig), list[tuple[Tracker, Indices]](), None
+    if smooth:
+        return SmoothedScene(rig, [(RecordingEstimator(own), columns) for own, columns in alone], articulated)
     if rig.tracker.kind == "classic":  # it locates markers wherever they are
-        return _scene(rig, [(ClassicTracker(rig), np.arange(len(rig.markers.markers)))])
-    require_estimator(rig)
-    alone = rigs_of_hands(rig)
-    if not rig.tracker.contours:
-        return _scene(rig, [(Estimator(own), columns) for own, columns in alone])
-    aside = LATERAL_M if len(alone) > 1 else 0.0  # a right palm that faces a camera is to its left
-    hands = [(ContourEstimator(own, len(alone), -aside if own.hand.side == "right" else aside), columns)
-             for own, columns in alone]
-    return _scene(rig, hands, SharedImages(rig, [hand for hand, _ in hands]) if len(hands) > 1 else None)
-
-
-def _scene(rig: Rig, hands: Sequence[tuple[Tracker, Indices]], images: SharedImages | None = None) -> Tracker:
-    return hands[0][0] if len(hands) == 1 and not rig.objects else Scene(rig, hands, images)
+        hands.append((ClassicTracker(rig), np.arange(len(rig.markers.markers))))
+    elif not rig.tracker.contours:
+        hands += [(Estimator(own), columns) for own, columns in alone]
+    else:
+        aside = LATERAL_M if len(alone) > 1 else 0.0  # a right palm that faces a camera is to its left
+        bare = [ContourEstimator(own, len(alone), -aside if own.hand.side == "right" else aside) for own, _ in alone]
+        hands += [(hand, columns) for hand, (_, columns) in zip(bare, alone, strict=True)]
+        images = SharedImages(rig, bare) if len(bare) > 1 else None
+    if len(hands) == 1 and not rig.objects and not articulated:
+        return hands[0][0]
+    return Scene(rig, hands, articulated, images)
 
 
 def require_estimator(rig: Rig) -> None:
@@ -81,9 +82,13 @@ class Scene(Tracker):
     `other`, the state of the other hand, has that hand's markers only. What fails over one of them costs it alone.
     """
 
-    def __init__(self, rig: Rig, hands: Sequence[tuple[Tracker, Indices]], images: SharedImages | None = None) -> None:
-        """`hands`: the tracker of each, and the numbers of its markers in the rig. `images`: what gives two bare hands
-        their parts of images. Raises RigError when the mesh of an object cannot be used."""
+    _kept_in: ClassVar[type[RigObjects]] = RigObjects
+
+    def __init__(self, rig: Rig, hands: Sequence[tuple[Tracker, Indices]], articulated: Sequence[ObjectTrack] = (),
+                 images: SharedImages | None = None) -> None:
+        """`hands`: the tracker of each, and the numbers of its markers in the rig. `articulated`: tracks of objects
+        beside the rig's. `images`: what gives two bare hands their parts of images. Raises RigError when the mesh of an
+        object cannot be used."""
         self._hands, self._columns = [hand for hand, _ in hands], [columns for _, columns in hands]
         self._images, self.key_frames = images, self._hands[0].key_frames
         self.diagnostics = Diagnostics()
@@ -93,7 +98,8 @@ class Scene(Tracker):
         self._of_objects = [(number, self._ids.index(marker.marker), 1e-3 * np.array(marker.position_mm))
                             for number, model in enumerate(rig.models) for marker in model.markers]
         self._extrapolators = [Extrapolator(own) for own, _ in rigs_of_hands(rig)] if len(hands) > 1 else []
-        self._objects = self._make_objects(rig) if rig.objects else None
+        self._objects = (self._kept_in(rig, self.diagnostics, articulated) if rig.objects or articulated
+                         else None)
         self._sequence = 0
         self._clear()
 
@@ -101,9 +107,6 @@ class Scene(Tracker):
     def hands(self) -> Sequence[Tracker]:
         """The trackers of the rig's hand and of its other hand."""
         return self._hands
-
-    def _make_objects(self, rig: Rig) -> RigObjects:
-        return RigObjects(rig, self.diagnostics)
 
     def _clear(self) -> None:
         self._newest: list[CameraObservations | None] = [None] * len(self._cameras)
@@ -126,7 +129,7 @@ class Scene(Tracker):
             self._ingest_markers(frame)
         elif isinstance(frame, EdgeFrame | ForegroundFrame) and self._images is not None:
             self._images.ingest(frame)
-        elif isinstance(frame, FiducialFrame | MeasuredPose):
+        elif isinstance(frame, ObjectFrame):
             if self._objects is not None:
                 self._objects.ingest(frame)
         elif isinstance(frame, HandFrame):
@@ -248,16 +251,14 @@ class SmoothedScene(Scene):
     """A scene for recordings: takes frames in the order of arrival, and gives states, which use all of them, in the
     order of time."""
 
-    smooths = True
+    smooths, _kept_in = True, SmoothedObjects
 
-    def __init__(self, rig: Rig, hands: list[tuple[RecordingEstimator, Indices]]) -> None:
+    def __init__(self, rig: Rig, hands: list[tuple[RecordingEstimator, Indices]],
+                 articulated: Sequence[ObjectTrack] = ()) -> None:
         """Raises RigError as `Scene`."""
-        super().__init__(rig, hands)
+        super().__init__(rig, hands, articulated)
         self._recorded = [hand for hand, _ in hands]
         self._waiting: list[dict[int, Instant]] = [{} for _ in hands]  # for the same frame of the other hand
-
-    def _make_objects(self, rig: Rig) -> RigObjects:
-        return SmoothedObjects(rig, self.diagnostics)
 
     def reset(self) -> None:
         """End the hands' tracks: a new session, or a clock was set. Objects and states that are not taken yet stay."""

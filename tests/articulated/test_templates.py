@@ -6,12 +6,13 @@ from objects import object_of
 from painted_object import meshes_of, picture
 from pictures import look_at, wall
 
-from rhot_app.articulated.bodies import ANGLES, camera_rays, place, root_of
+from rhot_app.articulated.bodies import ANGLES, camera_rays, place
 from rhot_app.articulated.layered import LayeredFrame, chain_rows
 from rhot_app.articulated.outline import outline_of
 from rhot_app.articulated.templates import TemplateSet, filtered, noise_gain
-from rhot_app.articulated.tracker import ConstantVelocity
 from rhot_app.articulated.visibility import NONE, segment, visibility
+from rhot_app.estimation.layout import pose_matrix
+from rhot_app.tracking.kinds.templates import ConstantVelocity
 
 ANGLES_DEG = np.array([20.0, 30.0, 60.0, 50.0])
 CAMERA = look_at(np.array([0.10, -0.28, 0.27]), np.array([0.04, 0.0, 0.0]), focal=500.0, width=400, height=300)
@@ -35,7 +36,7 @@ def image_of(angles_deg=ANGLES_DEG, texture=0.15, gain=1.0):
 
 
 def placed_at(state):
-    return place(BODIES, root_of(state), state[ANGLES:ANGLES + 4])
+    return place(BODIES, pose_matrix(state), state[ANGLES:ANGLES + 4])
 
 
 def taken(kind="raw", texture=0.15):

@@ -10,9 +10,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rhot_app.barehand.surface import FOREARM, Surface, capsules_of, ray_to_capsule
+from rhot_app.barehand.surface import FOREARM, Surface, posed, ray_to_capsule
 from rhot_app.geometry.camera import CameraModel, intrinsics_row
 from rhot_app.geometry.transforms import inverse, rigid
+from rhot_app.hand.motion.hand_state import SHAPE
 from rhot_app.hand.skeleton import HandPose
 
 Array = NDArray[np.float64]
@@ -87,6 +88,12 @@ def picture_of(hands: Sequence[tuple[Surface, HandPose]], camera: CameraModel, b
         centres, radii = (np.concatenate(columns) for columns in zip(*shapes, strict=True))
         _cast(centres, radii, np.tile(SKIN, (len(radii), 1)), camera, out)
     return taken(out, seed)
+
+
+def capsules_of(surface: Surface, world: Array, angles: Array, shape: Array | None = None) -> tuple[Array, Array]:
+    """`centres` (N, 2, 3) m and `radii` (N, 2) m of a posed hand: `world` (4, 4), `angles` (21,) rad."""
+    hand = posed(surface, world, angles, np.zeros(SHAPE) if shape is None else shape)
+    return hand.centres, hand.radii
 
 
 def _with_forearm(surface: Surface, world: Array, angles: Array, forearm_m: float) -> tuple[Array, Array]:

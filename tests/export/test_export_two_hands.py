@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import count
+from logging import LogRecord
 from pathlib import Path
 
 import bvh
@@ -17,9 +19,12 @@ from tracked_log import states_of_log
 
 from rhot_app.export.export import export_log
 from rhot_app.export.plan import ExportOptions
-from rhot_app.export.states import HandStates
+from rhot_app.export.recording import TrackedLog
+from rhot_app.export.states import HandStates, joined
 from rhot_app.hand.skeleton import JOINTS
 from rhot_app.project import OTHER_HAND, TrackerSettings
+from rhot_app.state import HandState
+from rhot_app.tracking.markers.estimator import Estimator
 
 ASIDE = np.array([-0.14, 0.0, 0.05])  # where the left hand is, m
 
@@ -53,6 +58,24 @@ def test_both_are_smoothed(both: Path, states: HandStates) -> None:
         assert after.tracked.mean() > before.tracked.mean() - 0.05
         spread = [np.nanmedian(np.trace(one.fingertip_covariances, axis1=2, axis2=3)) for one in (before, after)]
         assert spread[1] < 0.9 * spread[0]
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_what_one_hand_is_failed_over_is_a_loss_of_the_export(both: Path, smooth: bool, monkeypatch: pytest.MonkeyPatch,
+                                                              tracker_may_fail: list[LogRecord]) -> None:
+    solve, hands, calls = Estimator.solve, list[Estimator](), count()
+
+    def failing(hand: Estimator) -> HandState | None:
+        hands.extend([] if hand in hands else [hand])
+        found = solve(hand)
+        if hand is hands[-1] and len(hands) == 2 and 30 <= next(calls) < 34:
+            raise ZeroDivisionError("its length")
+        return found
+    monkeypatch.setattr(Estimator, "solve", failing)
+    with TrackedLog(both, smooth=smooth) as log:
+        assert len(joined(list(log.blocks()))) > 10
+        loss, = log.losses
+    assert "the other hand" in loss and "its length" in loss and "4 frames" in loss and len(tracker_may_fail) == 1
 
 
 def test_tables_and_points_have_both(both: Path, states: HandStates, tmp_path: Path) -> None:

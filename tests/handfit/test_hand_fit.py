@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from bare_scenes import rig_of
 from fit_scenes import another_hand, begun, drawn, seen
+from pictures import capsules_of
 from shipped_rig import RIGHT_HAND, RIGHT_MODEL
 
-from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, capsules_of, surface_of
+from rhot_app.barehand.surface import FOREARM_TURN, LENGTH, RADIUS, surface_of
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import load_hand, save_hand
 from rhot_app.hand.kinematics import forward

@@ -14,6 +14,8 @@ from rhot_app.hand.anatomy import load_hand
 from rhot_app.hand.model import build_model
 from rhot_app.objects.object_file import ObjectModel, cube, plate
 from rhot_app.objects.observations import FiducialFrame
+from rhot_app.objects.state import ObjectState
+from rhot_app.objects.track import ObjectTracker
 from rhot_app.simulator.scene.motion import Motion
 from rhot_app.simulator.scene.motion_file import load_motion
 from rhot_app.simulator.scene.scene import make_scene, twin_defaults
@@ -83,3 +85,11 @@ def observe(model: ObjectModel, poses, cameras: list[CameraModel], camera: int, 
                     np.int64).reshape(-1, 2)
     covariances = np.broadcast_to(noise_px**2 * np.eye(2), (*corners.shape, 2)).copy()
     return FiducialFrame(camera, t_row0_ns, row_ns, keys, corners, covariances)
+
+
+def taken(tracker: ObjectTracker, frame: FiducialFrame) -> list[ObjectState]:
+    """The state of every object after one frame, at the time of what the frame shows of it, or of row 0."""
+    tracker.take(frame)
+    newest = [track.estimate() for track in tracker.tracks]
+    return [track.state(max(frame.t_row0_master_ns, 0 if found is None else found[0]))
+            for track, found in zip(tracker.tracks, newest, strict=True)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from object_scenes import CUBE, PERIOD_NS, hand_poses, wide_cameras
+from object_scenes import CUBE, PERIOD_NS, hand_poses, taken, wide_cameras
 from tag_pictures import render
 
 from rhot_app.estimation.se3 import log_so3
@@ -41,7 +41,7 @@ def test_rendered_images_are_tracked() -> None:
         true = hand_poses("grasp", np.array([1e-9 * t_ns]))[0]
         received = decode(encode(message(detector.detect(render(CUBE, true, cameras[camera], rng)))))
         assert isinstance(received, Fiducials)
-        state = tracker.take(fiducial_frame(received, camera, t_ns))[0]
+        state = taken(tracker, fiducial_frame(received, camera, t_ns))[0]
         assert state.validity is Validity.TRACKED
         errors.append(np.concatenate([state.world_from_object[:3, 3] - true[:3, 3],
                                       log_so3(state.world_from_object[:3, :3] @ true[:3, :3].T)]))

@@ -10,7 +10,7 @@ from logging import LogRecord
 
 import numpy as np
 import pytest
-from object_scenes import CUBE, PERIOD_NS, ROW_NS, TAG, hand_poses, observe, wide_cameras
+from object_scenes import CUBE, PERIOD_NS, ROW_NS, TAG, hand_poses, observe, taken, wide_cameras
 
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import ObjectError
@@ -53,7 +53,7 @@ def errors(states: list[ObjectState], poses: Poses) -> tuple[np.ndarray, np.ndar
 
 def track(model: ObjectModel, stream: list[FiducialFrame]) -> list[ObjectState]:
     tracker = ObjectTracker([model], CAMERAS)
-    return [tracker.take(frame)[0] for frame in stream]
+    return [taken(tracker, frame)[0] for frame in stream]
 
 
 def nees(states: list[ObjectState], poses: Poses) -> float:
@@ -124,7 +124,7 @@ def test_an_object_is_lost_and_returns() -> None:
         gone = 0.5 < 1e-9 * (frame.t_row0_master_ns - START_NS) < 1.5
         shown = FiducialFrame(frame.camera, frame.t_row0_master_ns, frame.row_time_ns, frame.keys[:0],
                               frame.corners[:0], frame.covariances[:0]) if gone else frame
-        validities.append((1e-9 * (frame.t_row0_master_ns - START_NS), tracker.take(shown)[0]))
+        validities.append((1e-9 * (frame.t_row0_master_ns - START_NS), taken(tracker, shown)[0]))
     def at(low: float, high: float) -> set[Validity]:
         return {state.validity for t_s, state in validities if low < t_s < high}
     assert at(0.0, 0.5) == {Validity.TRACKED}
@@ -143,7 +143,7 @@ def test_wrong_readings_are_rejected_and_a_moved_object_is_found_again() -> None
         pose = moved if number in (30, 31, 45) or number >= 60 else still  # two wrong frames, one, and then all
         t_ns = START_NS + number * PERIOD_NS // 2
         frame = observe(TAG, lambda t_s, pose=pose: pose, CAMERAS, number % 2, t_ns, ROW_NS, rng)
-        found.append(tracker.take(frame)[0].world_from_object[:3, 3])
+        found.append(taken(tracker, frame)[0].world_from_object[:3, 3])
     places = np.array(found)
     assert np.linalg.norm(places[5:60] - still[:3, 3], axis=1).max() < 5e-3
     assert np.linalg.norm(places[63:] - moved[:3, 3], axis=1).max() < 10e-3
@@ -163,9 +163,9 @@ def test_several_objects_are_tracked_at_once() -> None:
     for number in range(80):
         camera, t_ns = number % 2, START_NS + number * PERIOD_NS // 2
         both = [observe(model, where[model.name], CAMERAS, camera, t_ns, ROW_NS, rng) for model in (CUBE, TAG)]
-        states.append(tracker.take(FiducialFrame(camera, t_ns, ROW_NS, np.concatenate([one.keys for one in both]),
-                                                 np.concatenate([one.corners for one in both]),
-                                                 np.concatenate([one.covariances for one in both]))))
+        states.append(taken(tracker, FiducialFrame(camera, t_ns, ROW_NS, np.concatenate([one.keys for one in both]),
+                                                   np.concatenate([one.corners for one in both]),
+                                                   np.concatenate([one.covariances for one in both]))))
     for number, name in enumerate(("cube", "tag")):
         assert {one[number].name for one in states} == {name}
         assert errors([one[number] for one in states[10:]], where[name])[0].max() < 5e-3
@@ -187,7 +187,7 @@ def test_a_tag_that_is_seen_twice_counts_where_the_object_is_predicted() -> None
     poses, diagnostics = in_hand("grasp"), Diagnostics()
     tracker, states = ObjectTracker([CUBE], CAMERAS, diagnostics, ("left", "right")), []
     for number, frame in enumerate(frames(CUBE, poses, 1.0, 1)):
-        states.append(tracker.take(frame if number < 4 else with_a_copy(frame, np.array([60.0, 400.0])))[0])
+        states.append(taken(tracker, frame if number < 4 else with_a_copy(frame, np.array([60.0, 400.0])))[0])
     distances, angles = errors(states, poses)
     assert len(distances) == len(states) and distances.max() < 3e-3 and np.degrees(angles.max()) < 2.0
     said = diagnostics.all()
@@ -200,7 +200,7 @@ def test_a_tag_that_is_seen_twice_counts_nowhere_without_a_prediction() -> None:
     poses, diagnostics = swaying(20.0), Diagnostics()
     stream = [with_a_copy(frame, np.array([60.0, 400.0])) for frame in frames(TAG, poses, 0.3, 1)]
     tracker = ObjectTracker([TAG], CAMERAS, diagnostics)
-    assert {tracker.take(frame)[0].validity for frame in stream} == {Validity.SEARCHING}
+    assert {taken(tracker, frame)[0].validity for frame in stream} == {Validity.SEARCHING}
     assert sum(one.count for one in diagnostics.all()) == len(stream)
     # Two prints at nearly the same place: the prediction cannot say which is the object's.
     tracker = ObjectTracker([TAG], CAMERAS)
@@ -208,7 +208,7 @@ def test_a_tag_that_is_seen_twice_counts_nowhere_without_a_prediction() -> None:
     for frame in exact[:20]:
         tracker.take(frame)
     for frame in exact[20:]:
-        state = tracker.take(with_a_copy(frame, frame.corners[0].mean(axis=0) + 0.05))[0]
+        state = taken(tracker, with_a_copy(frame, frame.corners[0].mean(axis=0) + 0.05))[0]
     assert state.validity is Validity.LOST
 
 
@@ -224,7 +224,7 @@ def test_an_object_that_is_failed_over_costs_only_itself(monkeypatch: pytest.Mon
     monkeypatch.setattr(ObjectTrack, "take", fail)
     tracker, counts = ObjectTracker([CUBE, TAG], CAMERAS, diagnostics), []
     for cube, tag in zip(frames(CUBE, poses, 1.0, 1), frames(TAG, swaying(20.0), 1.0, 2), strict=True):
-        states = tracker.take(replace(cube, keys=np.concatenate([cube.keys, tag.keys]),
+        states = taken(tracker, replace(cube, keys=np.concatenate([cube.keys, tag.keys]),
                                       corners=np.concatenate([cube.corners, tag.corners]),
                                       covariances=np.concatenate([cube.covariances, tag.covariances])))
         counts.append(tuple(state.tracked for state in states))
@@ -262,3 +262,17 @@ def test_one_outlier_that_only_the_flip_explains_does_not_end_the_right_pose(wro
         assert accepted and np.linalg.norm(log_so3(shown[:3, :3])) < 0.05, "the right pose went on"
     else:  # three in a row are no outliers
         assert not accepted and np.linalg.norm(log_so3(shown[:3, :3] @ flip[:3, :3].T)) < 0.05
+
+
+def test_estimates_of_one_hypothesis_have_one_label_and_those_of_another_one_another() -> None:
+    """What is smoothed together."""
+    right, flip = rigid(np.eye(3), [0.0, 0.0, 0.6]), rigid(exp_so3([2.0, 0.0, 0.0]), [0.0, 0.0, 0.6])
+    track, labels = ObjectTrack("tag"), []
+    track.take(TwoPoses(0, right, flip))
+    for number, pose in enumerate((right, right, flip, right, right, flip, flip, flip, right)):
+        track.take(PoseMeasurement((1 + number) * PERIOD_NS, pose, POSE_COVARIANCE))
+        found = track.estimate()
+        assert found is not None
+        labels.append(found[1].label)
+    assert all(label is labels[0] for label in labels[:5]), "the right one, beside an outlier"
+    assert labels[7] is labels[8] and labels[7] is not labels[0], "a start anew"

@@ -1,5 +1,6 @@
 """Landmarks of a bare hand in the estimator: their rows, start, errors against triangulation, one camera, and paint."""
 
+from collections import Counter
 from dataclasses import replace
 from functools import cache
 
@@ -117,6 +118,22 @@ def test_each_landmark_errs_by_itself_in_proportion_to_its_distance():
     np.testing.assert_allclose(rows.jacobian.T @ rows.jacobian,
                                jacobian.T @ np.linalg.solve(covariance, jacobian), rtol=1e-3, atol=1.0)
     np.testing.assert_allclose(rows.error @ rows.error, error @ np.linalg.solve(covariance, error), rtol=1e-3)
+
+
+def test_a_frame_that_is_weighed_again_has_the_noise_of_its_detector_once(monkeypatch):
+    """A start weighs the frames again that led to it."""
+    widen, weighed = MarkerFrame.add_landmark_noise, []
+
+    def widened(frame, state):
+        weighed.append((frame.camera, frame.observations.t_row0_master_ns))
+        np.testing.assert_array_equal(frame.covariances, frame.observations.covariances)
+        widen(frame, state)
+    monkeypatch.setattr(MarkerFrame, "add_landmark_noise", widened)
+    tracker = make_tracker(RIG)
+    for one in detected_landmarks(RIG, hand(), 1)[:30]:
+        tracker.ingest(one)
+        tracker.solve()
+    assert max(Counter(weighed).values()) > 1, "no frame was weighed twice"
 
 
 def test_the_hand_is_found_from_the_first_frames_of_two_cameras():

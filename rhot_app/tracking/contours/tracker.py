@@ -22,6 +22,7 @@ from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, ImageFram
 from rhot_app.barehand.start import MIN_DWELL_NS
 from rhot_app.barehand.tracker import BareHandTracker
 from rhot_app.diagnostics import Diagnostics
+from rhot_app.estimation.filter import Estimate
 from rhot_app.estimation.track import NEVER, SESSION_NS
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.project import Rig
@@ -35,7 +36,6 @@ from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame
 from rhot_node.wire.search import SLICES_MAX
 
 Array = NDArray[np.float64]
-Estimate = tuple[Array, Array]
 
 
 class ContourEstimator(Tracker):

@@ -1,4 +1,4 @@
-"""All kinds of observations that nodes send."""
+"""All kinds of observations: those that nodes send, and pictures of files."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from rhot_app.tracking.kinds.kind import Kind
 from rhot_app.tracking.kinds.landmarks import LandmarkKind
 from rhot_app.tracking.kinds.markers import MarkerKind
 from rhot_app.tracking.kinds.tags import TagKind
+from rhot_app.tracking.kinds.templates import TemplateKind
 
-KINDS: list[type[Kind]] = [MarkerKind, LandmarkKind, EdgeKind, TagKind]
+KINDS: list[type[Kind]] = [MarkerKind, LandmarkKind, EdgeKind, TagKind, TemplateKind]
 
 
 def register(kind: type[Kind]) -> None:
