@@ -61,13 +61,16 @@ def test_both_are_smoothed(both: Path, states: HandStates) -> None:
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_what_one_hand_is_failed_over_is_a_loss_of_the_export(both: Path, smooth: bool, monkeypatch: pytest.MonkeyPatch,
-                                                              tracker_may_fail: list[LogRecord]) -> None:
+def test_what_one_hand_is_failed_over_and_warns_of_reaches_the_export(both: Path, smooth: bool,
+                                                                      monkeypatch: pytest.MonkeyPatch,
+                                                                      tracker_may_fail: list[LogRecord]) -> None:
     solve, hands, calls = Estimator.solve, list[Estimator](), count()
 
     def failing(hand: Estimator) -> HandState | None:
         hands.extend([] if hand in hands else [hand])
         found = solve(hand)
+        if hands.index(hand) == 1:
+            hand.diagnostics.warn("its thumb is ambiguous")
         if hand is hands[-1] and len(hands) == 2 and 30 <= next(calls) < 34:
             raise ZeroDivisionError("its length")
         return found
@@ -75,6 +78,7 @@ def test_what_one_hand_is_failed_over_is_a_loss_of_the_export(both: Path, smooth
     with TrackedLog(both, smooth=smooth) as log:
         assert len(joined(list(log.blocks()))) > 10
         loss, = log.losses
+        assert log.warnings == ["its thumb is ambiguous"]
     assert "the other hand" in loss and "its length" in loss and "4 frames" in loss and len(tracker_may_fail) == 1
 
 
