@@ -170,12 +170,13 @@ def turned(bench: Bench) -> Results:
 
 
 def _mistaken(take: DataSet, rig: Rig, turn: Array) -> Figures:
-    """Spread and errors with the second camera turned by a rotation vector (3,) rad about its own axes."""
+    """Spread and errors with the second camera turned by a rotation vector (3,) rad about its own axes, and a rig that
+    does not say how well it was calibrated."""
     pose = rig.nodes[1].pose
     quaternion = quaternion_from_rotation(exp_so3(turn) @ rotation_from_quaternion(pose.rotation_wxyz))
     other = msgspec.structs.replace(pose, rotation_wxyz=tuple(quaternion.tolist()))
     second = msgspec.structs.replace(rig.nodes[1], pose=other)
-    mistaken = msgspec.structs.replace(rig, nodes=(rig.nodes[0], second, *rig.nodes[2:]))
+    mistaken = msgspec.structs.replace(rig, nodes=(rig.nodes[0], second, *rig.nodes[2:]), calibration=None)
     return scenarios.standing_still(take, mistaken) | scenarios.plain(take, mistaken)
 
 

@@ -131,7 +131,7 @@ class Pipeline:
                 if may_be_due(frame) and (not live or frame is last):
                     if not live:
                         tracker.wait()
-                    solved = tracker.solve()
+                    solved = next(tracker.states(), None)
             if solved is not None:
                 self._send(solved, live)
                 state = solved

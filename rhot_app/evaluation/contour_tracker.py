@@ -79,7 +79,7 @@ class SearchedNodes:
         """Hand one frame to the tracker, keep its state if one is due, and note what it asks for."""
         self.tracker.ingest(frame)
         self.tracker.wait()
-        state = self.tracker.solve() if may_be_due(frame) else None
+        state = next(self.tracker.states(), None) if may_be_due(frame) else None
         if state is not None:
             self.states.append(state)
         for request in self.tracker.requests():

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ForegroundFrame, SliceRequest
 from rhot_app.barehand.start import LATERAL_M
+from rhot_app.calibration.check.camera_calibration import CalibrationAccuracy, calibration_error
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import RigError
 from rhot_app.estimation.track import NEVER, comes_late
@@ -30,7 +31,14 @@ from rhot_app.tracking.markers.estimator import Estimator
 from rhot_app.tracking.rig_arrays import rigs_of_hands
 from rhot_app.tracking.rig_objects import RigObjects, SmoothedObjects
 from rhot_app.tracking.smoothing import RECENT, Instant, RecordingEstimator
-from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker, may_be_due
+from rhot_app.tracking.tracker import (
+    CameraFrame,
+    CameraObservations,
+    HandFrame,
+    Tracker,
+    may_be_due,
+    with_calibration_error,
+)
 from rhot_node.wire.messages import MarkerFlag
 
 Indices = NDArray[np.intp]
@@ -49,6 +57,12 @@ def make_tracker(rig: Rig, *, smooth: bool = False, articulated: Sequence[Object
     the rig's tracker must be one that smooths. `articulated`: tracks of objects that the rig does not have. Raises
     RigError when the estimator cannot work with its markers, cameras or nodes, or the mesh of an object cannot be
     used."""
+    tracker = _tracker_of(rig, smooth, articulated)
+    tracker.by_calibration = calibration_error(rig)
+    return tracker
+
+
+def _tracker_of(rig: Rig, smooth: bool, articulated: Sequence[ObjectTrack]) -> Tracker:
     if smooth or rig.tracker.kind != "classic":
         require_estimator(rig)
     alone, hands, images = rigs_of_hands(rig), list[tuple[Tracker, Indices]](), None
@@ -172,6 +186,12 @@ class Scene(Tracker):
         for hand in self._hands:
             hand.wait()
 
+    def calibration_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
+        """See `Tracker`."""
+        for hand in self._hands:
+            stated = hand.calibration_error(stated)
+        return stated
+
     # -- states --------------------------------------------------------------------------------------------------------
 
     def solve(self) -> HandState | None:
@@ -288,7 +308,7 @@ class SmoothedScene(Scene):
                          for hand, instant in zip(self._recorded, instants, strict=True)]
             if not part.failed:
                 self._published_ns = t_ns
-                yield self._at(t_ns, hands)
+                yield with_calibration_error(self._at(t_ns, hands), self.calibration_error(self.by_calibration))
 
     def finish(self) -> Iterator[HandState]:
         """The rest of the states."""

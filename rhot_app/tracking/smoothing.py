@@ -117,6 +117,7 @@ class RecordingEstimator(Estimator):
         own = states.describe(instant.t_ns, knot.state, knot.covariance, 0, instant.observations, begun)
         out = states.describe(instant.t_ns + later_ns, state, covariance, 0, instant.observations, begun,
                               by_one=weighed.by_one)
+        self._states.turns = states.turns
         return replace(out, marker_raw_positions=own.marker_raw_positions, epipolar_error_px=own.epipolar_error_px)
 
     def _note(self, weighed: Weighed | None) -> Instant | None:

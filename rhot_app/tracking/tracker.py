@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.observations import EdgeFrame, ImageFrame, SliceRequest
+from rhot_app.calibration.check.camera_calibration import KNOWN_EXACTLY, CalibrationAccuracy
 from rhot_app.diagnostics import Diagnostics, Part
 from rhot_app.estimation.residual import Residual
 from rhot_app.objects.observations import MeasuredPose, ObjectFrame
@@ -107,6 +108,9 @@ class Tracker:
     diagnostics: Diagnostics
     """What it fails over and warns of."""
 
+    by_calibration: CalibrationAccuracy = KNOWN_EXACTLY
+    """What the calibration of the rig adds to the error of every place, as the rig says."""
+
     key_frames: KeyFrames | None = None
     """The frames that tell most of a bare hand's shape; None for a tracker without contours. Any thread may read."""
 
@@ -120,7 +124,8 @@ class Tracker:
         raise NotImplementedError
 
     def solve(self) -> HandState | None:
-        """The state at the newest instant that is due and not yet published, or None."""
+        """The state at the newest instant that is due and not yet published, or None. Its covariances are conditional
+        on the calibration, as those that are compared with each other have to be."""
         return None
 
     def stands(self, state: HandState) -> bool:
@@ -128,10 +133,15 @@ class Tracker:
         return True
 
     def states(self) -> Iterator[HandState]:
-        """All states that are due."""
+        """All states that are due, to be published: the error of the calibration is in their covariances."""
         state = self.solve()
         if state is not None:
-            yield state
+            yield with_calibration_error(state, self.calibration_error(self.by_calibration))
+
+    def calibration_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
+        """What the calibration adds to the error of every place of the last state: what the rig has `stated`, and what
+        the tracker has found."""
+        return stated
 
     def finish(self) -> Iterator[HandState]:
         """A recording is over: the rest of the states."""
@@ -154,6 +164,26 @@ class Tracker:
 
     def wait(self) -> None:
         """Wait until searches on other threads have ended. A replay calls it; live, nobody waits."""
+
+
+def with_calibration_error(state: HandState, error: CalibrationAccuracy) -> HandState:
+    """The state with `error` in the covariances of all places: of the hands and of the objects."""
+    if error.sd_m == error.turned_m == 0.0:
+        return state
+
+    def of_pose(pose: Array, covariance: Array) -> Array:
+        out = covariance.copy()
+        out[:3, :3] += error.covariances(pose[:3, 3])
+        return out
+
+    return replace(
+        state, marker_covariances=state.marker_covariances + error.covariances(state.marker_positions),
+        joint_covariances=state.joint_covariances + error.covariances(state.joint_positions),
+        fingertip_covariances=state.fingertip_covariances + error.covariances(state.fingertip_positions),
+        palm_covariance=of_pose(state.world_from_palm, state.palm_covariance),
+        other=None if state.other is None else with_calibration_error(state.other, error),
+        objects=tuple(replace(one, covariance=of_pose(one.world_from_object, one.covariance))
+                      for one in state.objects))
 
 
 def may_be_due(frame: CameraFrame) -> bool:

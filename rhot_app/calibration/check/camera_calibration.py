@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -18,6 +18,9 @@ from rhot_app.project import Intrinsics, Rig, RigNode
 Array = NDArray[np.float64]
 
 NOT_CALIBRATED = "Not calibrated: millimetres are not reliable."
+LEAST_BASE_M = 1e-3
+"""m: cameras nearer to each other show no distance."""
+
 _NO_TURN = 1e-9
 """Vector part of a rotation's quaternion below which a pose is nominal. No solve finds cameras that parallel."""
 
@@ -126,13 +129,15 @@ class CalibrationAccuracy:
     """What a rig's calibration adds to the uncertainty of positions.
 
     `sd_m` is the standard deviation at `distance_m` from `middle` (3,) m, the middle of the cameras, in the rig frame.
-    It is NaN when it is unknown, and `reason` then says why in a sentence.
+    It is NaN when it is unknown, and `reason` then says why in a sentence. `turned_m`: standard deviation there, along
+    the line of sight, by turns that the cameras were found to have.
     """
 
     sd_m: float
     distance_m: float
     middle: Array
     reason: str = ""
+    turned_m: float = 0.0
 
     @property
     def known(self) -> bool:
@@ -146,6 +151,28 @@ class CalibrationAccuracy:
         """
         away = np.linalg.norm(np.asarray(positions) - self.middle, axis=-1)
         return np.asarray(self.sd_m * np.square(away / self.distance_m))
+
+    def covariances(self, positions: Array) -> Array:
+        """Covariances (..., 3, 3) m^2 at positions (..., 3) m: the same along all axes, but at least that of the turns
+        along the line of sight. What is not known counts as nothing."""
+        away = np.asarray(positions) - self.middle
+        square, outer = np.square(away).sum(axis=-1)[..., None, None], away[..., :, None] * away[..., None, :]
+        each = 0.0 if self.reason else np.square(self.sd_m / self.distance_m**2) / 3.0
+        more = max(np.square(self.turned_m / self.distance_m**2) - each, 0.0)
+        return np.asarray(square * (each * square * np.eye(3) + more * outer))
+
+    def with_turns(self, turns: Array, centres: Array, reference: int) -> CalibrationAccuracy:
+        """With what C cameras at `centres` (C, 3) m add that are turned by `turns` (C,) rad, rms about an axis, against
+        the `reference`, if it is more than before."""
+        base = np.linalg.norm(centres - centres[reference], axis=1)
+        apart = (base > LEAST_BASE_M) & (turns > 0.0)
+        turned_m = float(np.sqrt(np.mean(np.square(turns[apart] / base[apart])))) if apart.any() else 0.0
+        return replace(self, middle=centres.mean(axis=0), turned_m=max(self.distance_m**2 * turned_m, self.turned_m))
+
+    def turn(self, base_m: Array) -> Array:
+        """Standard deviations (...,) rad of a turn between cameras `base_m` (...,) m apart that by itself makes this
+        error: dz = z^2 / B dphi."""
+        return np.asarray(self.sd_m * base_m / self.distance_m**2)
 
 
 KNOWN_EXACTLY = CalibrationAccuracy(0.0, 1.0, np.zeros(3))

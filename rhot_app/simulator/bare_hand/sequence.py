@@ -268,7 +268,8 @@ def varied_hand(anatomy: HandAnatomy, length_sd: float, radius_sd: float, seed: 
 
 
 def miscalibrated(rig: Rig, turn_rad: float, shift_m: float, seed: int) -> Rig:
-    """The rig with every camera but the first turned by `turn_rad` and shifted by `shift_m`, in random directions."""
+    """The rig with every camera but the first turned by `turn_rad` and shifted by `shift_m`, in random directions. It
+    does not say how well it is calibrated."""
     rng = np.random.default_rng([seed, 0xCA1])
     nodes = [rig.nodes[0]]
     for node in rig.nodes[1:]:
@@ -277,7 +278,7 @@ def miscalibrated(rig: Rig, turn_rad: float, shift_m: float, seed: int) -> Rig:
         w, x, y, z = (float(value) for value in quaternion_from_rotation(rotation))
         tx, ty, tz = (float(value) for value in np.array(node.pose.translation_m) + shift_m * way)
         nodes.append(msgspec.structs.replace(node, pose=CameraPose((w, x, y, z), (tx, ty, tz))))
-    return msgspec.structs.replace(rig, nodes=tuple(nodes))
+    return msgspec.structs.replace(rig, nodes=tuple(nodes), calibration=None)
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rhot_app.calibration.check.camera_calibration import CalibrationAccuracy
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import LOST_NS, NEVER, PREDICTED_NS, SESSION_NS, Life, TrackFilter
 from rhot_app.geometry.camera import undistort_points
+from rhot_app.geometry.turns import turns_covariance
 from rhot_app.hand.kinematics import empty_frames, forward_arrays
 from rhot_app.hand.landmarks import LASTING_S
 from rhot_app.hand.motion.hand_process import HandProcess
@@ -33,7 +35,7 @@ from rhot_app.tracking.locate import Located
 from rhot_app.tracking.markers.acquisition import START_SD, Starter, pose_before_camera, pose_on_plane
 from rhot_app.tracking.markers.estimator_state import EstimatorStates, RecentObservations
 from rhot_app.tracking.markers.hand_size import HandSize
-from rhot_app.tracking.markers.marker_model import MarkerModel, compile_markers
+from rhot_app.tracking.markers.marker_model import TURN_SD_RAD, MarkerModel, compile_markers
 from rhot_app.tracking.markers.marker_residual import MarkerFrame, lasting_covariances
 from rhot_app.tracking.rig_arrays import RigArrays, compile_rig
 from rhot_app.tracking.tracker import CameraFrame, CameraObservations, HandFrame, Tracker
@@ -49,8 +51,8 @@ REJECTIONS = 2
 
 KNOCKED, KNOCK_MOST = 3, 100.0
 """Markers that a camera rejects so at once, half or more of those that it sees: it has been knocked. Two may be fingers
-that bend faster than expected, or things of their colours. And the variance of the cameras' turns, over that which
-calibrations have, up to which it grows with every such frame: knocks of some ten milliradians (half a degree)."""
+that bend faster than expected, or things of their colours. And the variance of the cameras' turns, over TURN_SD_RAD's,
+up to which it grows with every such frame: knocks of some ten milliradians (half a degree)."""
 
 _PENDING = 16
 
@@ -88,6 +90,7 @@ class Estimator(Tracker):
         self.diagnostics = Diagnostics()
         self._rig, self._markers = compile_rig(rig), compile_markers(rig)
         self._tracked_with = rig.tracked_with
+        self._centres = np.array([node.pose.translation_m for node in rig.nodes])
         self._file_size, prior = self._markers, self._markers.pose_prior
         self._size: HandSize | None = None
         if rig.tracker.float_scale:
@@ -148,6 +151,12 @@ class Estimator(Tracker):
         knot = self._filter.newest
         return self._states.describe(self._filter.newest_ns, knot.state, knot.covariance, self._sequence - 1,
                                       taken[-1], begun, by_one=self._by_one)
+
+    def calibration_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
+        """See `Tracker`. Cameras that are found to be turned otherwise than the rig says are so about the axis, too,
+        about which this cannot be found."""
+        turns = np.where(self._tracked_with, self._states.turns, 0.0)
+        return stated.with_turns(turns, self._centres, self._markers.reference)
 
     def _take(self, observations: CameraObservations) -> bool:
         """Weigh one frame; False when it came before."""
@@ -259,9 +268,11 @@ class Estimator(Tracker):
             for part, factor in wrong:
                 self._process.inflate(inflated, part, factor)
             turns = slice(MOTION + 3 * len(frame.seen), None)
-            own, more = inflated[turns, turns], self._process.stationary[turns, turns]
-            if len(wrong) >= KNOCKED and 2 * len(wrong) >= candidates and np.trace(own) < KNOCK_MOST * np.trace(more):
-                own += more
+            markers, place = self._markers, pose_matrix(knot.state)[:3, 3]
+            own, knock = inflated[turns, turns], turns_covariance(
+                place, markers.poses, markers.reference, np.full(len(markers.poses), TURN_SD_RAD))
+            if len(wrong) >= KNOCKED and 2 * len(wrong) >= candidates and np.trace(own) < KNOCK_MOST * np.trace(knock):
+                own += knock
             self._filter.restart(inflated)
         accepted = int(np.count_nonzero(inliers))
         self._life.observe(frame.t_ns, accepted=accepted > 0, plausible=bool(2 * accepted >= candidates))

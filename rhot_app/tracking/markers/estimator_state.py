@@ -35,6 +35,7 @@ from rhot_app.tracking.markers.marker_residual import (
     SIZE_S,
     SIZE_SD,
     MarkerFrame,
+    expected_turn,
     fill_centre,
     place_points,
 )
@@ -144,7 +145,7 @@ class RecentObservations:
 
 
 class EstimatorStates:
-    """Makes states of estimates."""
+    """Makes states of estimates. `turns` (C,): the `expected_turn` of the last one."""
 
     def __init__(self, rig: RigArrays, markers: MarkerModel, observations: RecentObservations) -> None:
         self._rig, self._markers, self._observations = rig, markers, observations
@@ -155,6 +156,7 @@ class EstimatorStates:
         self._wrist = markers.marker_of(WRIST_ROLE)
         self._shapes = rig.shapes.copy()
         self._scale, self._scale_sd = 1.0, 0.0
+        self.turns = markers.turn_sd
 
     def resize(self, scale: float, sd: float) -> None:
         """Describe a hand `scale` times as large as its file says, with a standard deviation of the logarithm."""
@@ -165,6 +167,7 @@ class EstimatorStates:
         """The state of master time `t_ns`; work on it began at `begun`, s of `time.perf_counter`. `by_one`: one camera
         alone has found the hand, so it is as far as a hand of the file's size is."""
         solved, rig, observations, m = time.perf_counter(), self._rig, self._observations, self._markers
+        self.turns = expected_turn(state, covariance, m.arrays)
         state = state.copy()
         state[STATE.angles] = np.minimum(np.maximum(state[STATE.angles], m.limits[:, 0]), m.limits[:, 1])
         count = len(rig.marker_ids)

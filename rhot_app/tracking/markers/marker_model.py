@@ -10,8 +10,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rhot_app.calibration.check.camera_calibration import calibration_error
 from rhot_app.errors import RigError
 from rhot_app.geometry.camera import NEAREST_M, CameraModel, camera_coordinates, project_ray_with_slope
+from rhot_app.geometry.turns import HELD_SD_RAD, TURN_S
 from rhot_app.hand.anatomy import is_shipped
 from rhot_app.hand.dh import DhArrays
 from rhot_app.hand.landmarks import ANATOMY_SD_M, LASTING_S
@@ -36,14 +38,14 @@ landmark see `hand.landmarks`."""
 LASTING_PX = 0.01
 """px: standard deviation of the error of one camera's centroids that lasts (`python benchmarks/marker_errors.py`)."""
 
-TURN_SD_RAD, TURN_S = 1e-3, 3600.0
-"""rad, s: by how much a camera may be turned against the reference, beside what its calibration says: half a pixel of a
-lens of 530 px; and how long that lasts. If cameras are believed exactly, a hand at rest follows now the one, now
-the other, and shakes (`python benchmarks/trackers.py --only turned`)."""
+TURN_SD_RAD = 1e-3
+"""rad: by how much a camera may be turned against the reference, beside what its rig says, if the rig does not say how
+well it was calibrated, and after a knock: half a pixel of a lens of 530 px. If cameras are believed exactly, a hand at
+rest follows now the one, now the other, and shakes (`python benchmarks/trackers.py --only turned`)."""
 
-VERGENCE_SD_RAD = 2e-5
-"""rad: the same about the normal of the plane of both cameras and the hand, which is LASTING_PX. Such a turn moves the
-hand along the lines of sight and contradicts nothing: bones alone would decide it, and they are not known better."""
+DRIFT_SD_RAD = 7e-4
+"""rad: how far a camera turns on its mount within TURN_S, and so since it was calibrated. A bracket of PLA (7e-5 1/K,
+data sheet) whose sides differ by 10 K turns so far."""
 
 _COUPLED_SD_RAD = math.radians(0.02)  # as good as exact
 
@@ -67,6 +69,7 @@ class MarkerArrays(NamedTuple):
     poses: Array
     intrinsics: Array
     reference: int
+    turn_sd: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +82,7 @@ class MarkerModel:
     `landmark` (M,) bool: landmarks, which err as `hand.landmarks` says.
     `size_sd`: of the logarithm of the hand's size before anything of it is seen.
     `poses` (C, 3, 4) camera_from_world, m; `intrinsics` (C, 13) as `CameraModel`. `reference`: the first camera that is
-    tracked with, against which the others may be turned. `limits` (21, 2) rad.
+    tracked with, against which the others may be turned; `turn_sd` (C,) rad: by how much. `limits` (21, 2) rad.
     """
 
     model: HandModel
@@ -97,12 +100,14 @@ class MarkerModel:
     places: tuple[Place, ...]
     size_sd: float
     reference: int
+    turn_sd: Array
 
     @property
     def arrays(self) -> MarkerArrays:
         """What compiled functions take of it."""
         return MarkerArrays(self.dh, self.half_axes, self.slender, self.paint_variance, self.landmark, self.poses,
-                                            self.intrinsics, self.reference)
+                            self.intrinsics, self.reference, self.turn_sd)
+
     def scaled(self, factor: float) -> MarkerModel:
         """The markers on a hand `factor` times as large."""
         return replace(self, dh=scaled_table(self.dh, factor))
@@ -134,6 +139,7 @@ def compile_markers(rig: Rig) -> MarkerModel:
     model = with_markers(with_locked(build_model(rig.hand), rig.tracker.locked_deg), rig.markers)
     places = tuple(place_of(marker, model) for marker in rig.markers.markers)
     cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    reference = rig.tracked_with.index(True)
     return MarkerModel(
         model, points_on(model.dh, places), np.array([place.finger for place in places], dtype=np.int64),
         np.array([_half_axes(marker, model) for marker in rig.markers.markers]),
@@ -144,7 +150,18 @@ def compile_markers(rig: Rig) -> MarkerModel:
         np.array([camera.intrinsics for camera in cameras]),
         pose_prior_of(model, rig.tracker.variant), limit_set(model, rig.tracker.limits),
         tuple(marker.role or "" for marker in rig.markers.markers), places,
-        USUAL_SIZE_SD if is_shipped(rig.hand) else LEAST_SIZE_SD, rig.tracked_with.index(True))
+        USUAL_SIZE_SD if is_shipped(rig.hand) else LEAST_SIZE_SD, reference, turn_sds(rig, reference))
+
+
+def turn_sds(rig: Rig, reference: int) -> Array:
+    """(C,) rad: standard deviations of the cameras' turns against that of `reference`, beside what the rig says. Those
+    of a calibrated rig are of the calibration and of what may have happened since, to a simulated one nothing."""
+    error = calibration_error(rig)
+    if not error.known:
+        return np.full(len(rig.nodes), TURN_SD_RAD)
+    centres = np.array([node.pose.translation_m for node in rig.nodes])
+    drift = 0.0 if error.sd_m == 0.0 else DRIFT_SD_RAD
+    return np.maximum(np.hypot(error.turn(np.linalg.norm(centres - centres[reference], axis=1)), drift), HELD_SD_RAD)
 
 
 def scaled_table(dh: DhArrays, factor: float) -> DhArrays:

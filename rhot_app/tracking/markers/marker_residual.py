@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.residual import UNIT, Rows, student
-from rhot_app.estimation.se3 import exponential
-from rhot_app.geometry.camera import camera_coordinates, is_wide, pixels_per_metre, project_with_slope
+from rhot_app.geometry.camera import is_wide, pixels_per_metre, project_with_slope
+from rhot_app.geometry.turns import fill_by_turn, turn_covariances, turn_of, turned_pose
 from rhot_app.hand.kinematics import forward_arrays, jacobian_arrays, point_jacobian
 from rhot_app.hand.landmarks import NOISE_M
 from rhot_app.hand.motion.hand_state import MOTION, POSE, STATE
 from rhot_app.tracking.association import GATE, assign, list_candidates, squared_distances
-from rhot_app.tracking.markers.marker_model import LASTING_PX, TURN_SD_RAD, VERGENCE_SD_RAD, MarkerModel, project_marker
+from rhot_app.tracking.markers.marker_model import LASTING_PX, MarkerModel, project_marker
 from rhot_app.tracking.tracker import CameraObservations
 from rhot_node.wire.messages import MarkerFlag
 
@@ -163,21 +163,14 @@ def place_points(state, dh):
 
 
 @njit(cache=True)
-def turn_of(camera, reference):
-    """Which of a state's turns is this camera's; the reference has none."""
-    return camera - 1 if camera > reference else camera
-
-
-@njit(cache=True)
 def turned_camera(state, markers, camera):
     """camera_from_world (3, 4) of a camera with its turn in `state` about its own axes, rad, and the turn's left
     Jacobian (3, 3)."""
-    turn, rotation, left = np.zeros(3), np.empty((3, 3)), np.empty((3, 3))
+    turn = np.zeros(3)
     if camera != markers.reference:
         first = 3 * (markers.half_axes.shape[0] + turn_of(camera, markers.reference))
         turn[:] = state[STATE.lasting][first:first + 3]
-    exponential(turn[0], turn[1], turn[2], rotation, left)
-    return np.dot(rotation, markers.poses[camera]), left
+    return turned_pose(markers.poses[camera], turn)
 
 
 @njit(cache=True)
@@ -196,15 +189,13 @@ def fill_centre(state, m, late, point, jacobian, centre):
 @njit(cache=True)
 def project_markers(state, markers, camera, late_s):
     """Pixels (M, 2), NaN behind the camera, where the markers are seen `late_s` (M,) s after the state's instant, their
-    Jacobian (M, 2, n), and the scale (M,) px/m of the image at their places. A turn d moves the camera's coordinates p
-    by d x p, and so a pixel with the slope s, px/m, by d . (p x s)."""
+    Jacobian (M, 2, n), and the scale (M,) px/m of the image at their places."""
     count, cameras = late_s.shape[0], markers.poses.shape[0]
     pixels, scale = np.empty((count, 2)), np.empty(count)
     jacobian = np.zeros((count, 2, MOTION + 3 * (count + cameras - 1)))
     world, _, points, by_pose = place_points(state, markers.dh)
     (pose, left), intrinsics, centre = turned_camera(state, markers, camera), markers.intrinsics[camera], np.empty(3)
-    own, axis, ray, turning = (MOTION + 3 * (count + turn_of(camera, markers.reference)), np.empty(3), np.empty(3),
-                               np.empty(3))
+    own = MOTION + 3 * (count + turn_of(camera, markers.reference))
     slope, at_joint, joint_pixel = np.empty((2, 3)), np.empty((2, 3)), np.empty(2)
     for m in range(late_s.shape[0]):
         late = late_s[m]
@@ -227,12 +218,7 @@ def project_markers(state, markers, camera, late_s):
                 jacobian[m, r, MOTION + 3 * m + k] = slope[r, k]
             if camera == markers.reference or markers.landmark[m]:  # landmarks' errors last, and would turn the cameras
                 continue
-            for k in range(3):
-                axis[k] = pose[k, 0] * slope[r, 0] + pose[k, 1] * slope[r, 1] + pose[k, 2] * slope[r, 2]
-            ray[0], ray[1], ray[2] = camera_coordinates(pose, centre[0], centre[1], centre[2])
-            fill_cross(ray, axis, turning)
-            for k in range(3):
-                jacobian[m, r, own + k] = turning[0] * left[0, k] + turning[1] * left[1, k] + turning[2] * left[2, k]
+            fill_by_turn(centre, pose, left, slope[r], jacobian[m, r, own:own + 3])
     return pixels, jacobian, scale
 
 
@@ -369,26 +355,25 @@ def lasting_covariances(state, markers):
         out[m] = np.linalg.inv(information)
         for i in range(3):
             out[m, i, i] += markers.paint_variance[m]
-    reference, hand, origin, across = markers.poses[markers.reference], np.empty(3), np.empty(3), np.empty(3)
-    for camera in range(cameras):
-        if camera == markers.reference:
-            continue
-        pose, own = markers.poses[camera], out[count + turn_of(camera, markers.reference)]
-        hand[0], hand[1], hand[2] = camera_coordinates(pose, world[0, 3], world[1, 3], world[2, 3])
-        for i in range(3):  # the reference camera's place
-            across[i] = -(reference[0, i] * reference[0, 3] + reference[1, i] * reference[1, 3]
-                          + reference[2, i] * reference[2, 3])
-        origin[0], origin[1], origin[2] = camera_coordinates(pose, across[0], across[1], across[2])
-        fill_cross(origin, hand, across)
-        across /= max(math.sqrt(np.dot(across, across)), 1e-12)
-        for i in range(3):
-            own[i, i] = TURN_SD_RAD**2
-            for j in range(3):
-                own[i, j] += (VERGENCE_SD_RAD**2 - TURN_SD_RAD**2) * across[i] * across[j]
+    out[count:] = turn_covariances(world[:3, 3], markers.poses, markers.reference, markers.turn_sd)
     return out
 
 
 @njit(cache=True)
-def fill_cross(a, b, out):
-    """a x b."""
-    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+def expected_turn(state, covariance, markers):
+    """(C,) rad, rms about an axis: how far each camera is turned by an estimate, what is not known of it included. The
+    axis that is held says nothing: a turn about it is as likely as about the other two."""
+    count, cameras = markers.half_axes.shape[0], markers.poses.shape[0]
+    world, out = pose_matrix(state), np.zeros(cameras)
+    free = turn_covariances(world[:3, 3], markers.poses, markers.reference, np.ones(cameras))
+    for camera in range(cameras):
+        if camera == markers.reference:
+            continue
+        k, total = turn_of(camera, markers.reference), 0.0
+        first = 3 * (count + k)
+        turn, own = state[STATE.lasting][first:first + 3], covariance[MOTION + first:, MOTION + first:]
+        for i in range(3):
+            for j in range(3):
+                total += free[k, i, j] * (turn[i] * turn[j] + own[i, j])
+        out[camera] = math.sqrt(max(0.5 * total, 0.0))
+    return out

@@ -28,6 +28,7 @@ from rhot_app.geometry.camera import CameraModel, point_rays
 from rhot_app.geometry.transforms import inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, cast, empty_rays, triangulate
 from rhot_app.project import Rig
+from rhot_app.tracking.markers.marker_model import DRIFT_SD_RAD
 from rhot_app.tracking.pairing import DOUBTFUL, Paired, Pairing
 from rhot_app.tracking.refinement.pair_observations import TWIST, Pairs, PairStore, linearise, midpoints
 from rhot_app.tracking.refinement.refined_rig import CameraCorrection, Refinement
@@ -48,9 +49,8 @@ KNOCKS_PER_S = 1.0 / 36_000.0
 KNOCKED_BEFORE = 0.1
 """Probability of a knock between the calibration and the start."""
 
-WALK_SD = np.array([7e-4] * 3 + [3.5e-5] * 3)
-"""Drift within an hour, rad and m. A bracket of PLA (7e-5 1/K, data sheet) whose sides differ by 10 K turns by 7e-4,
-and its camera, 5 cm away, moves by 35 micrometres."""
+WALK_SD = np.array([DRIFT_SD_RAD] * 3 + [0.05 * DRIFT_SD_RAD] * 3)
+"""Drift within an hour, rad and m: a bracket turns, and its camera, 5 cm away, moves."""
 
 STUDENT = 4.0
 """Degrees of freedom of the errors' distribution, Student's t (Lange, Little and Taylor 1989)."""
@@ -235,7 +235,7 @@ class RigRefiner:
         error, variances = calibration_error(self.rig), []
         for camera in range(1, len(self._stored)):
             base_m = float(np.linalg.norm(self._stored[camera, :3, 3] - self._stored[0, :3, 3]))
-            sd = (error.sd_m * base_m / error.distance_m**2 if error.known
+            sd = (float(error.turn(np.array(base_m))) if error.known
                   else CALIBRATED_PX / float(self._focal[camera].mean()))
             variances += [max(sd, 1e-7) ** 2] * 3 + [(max(sd, 1e-7) * base_m) ** 2] * 3
         return np.array(variances)

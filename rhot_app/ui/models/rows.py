@@ -33,10 +33,10 @@ def worst_sd(covariances: Array) -> Array:
     return np.asarray(np.where(known, np.sqrt(np.maximum(values, 0.0)), np.nan))
 
 
-def total_sd(covariances: Array, positions: Array, by_calibration: CalibrationAccuracy) -> Array:
-    """Standard deviation (...,) m of places (..., 3) m along the worst axis, the calibration's own included; NaN where
-    either is not known."""
-    return np.asarray(np.hypot(worst_sd(covariances), by_calibration.at(positions)))
+def total_sd(covariances: Array, by_calibration: CalibrationAccuracy) -> Array:
+    """Standard deviation (...,) m of places along the worst axis, the calibration's own included, as it is in
+    `covariances` (..., 3, 3) where it is known; NaN where either is not known."""
+    return worst_sd(covariances) if by_calibration.known else np.full(covariances.shape[:-2], np.nan)
 
 
 def sd_number(sd_m: float) -> str:
@@ -150,7 +150,7 @@ def marker_rows(state: HandState, by_calibration: CalibrationAccuracy = KNOWN_EX
     rows = []
     least = worst_sd(state.marker_covariances)
     estimated = np.isfinite(state.marker_positions).all(axis=1) & np.isfinite(least)
-    spreads = total_sd(state.marker_covariances, state.marker_positions, by_calibration)
+    spreads = total_sd(state.marker_covariances, by_calibration)
     for index, name in enumerate(state.marker_ids):
         known = KNOWLEDGE[Knowledge(int(state.marker_knowledge[index]))]
         spread = spread_number(float(spreads[index]), float(least[index]))
@@ -173,7 +173,7 @@ def marker_detail(state: HandState, marker: int, by_calibration: CalibrationAccu
     variances = np.diagonal(state.marker_covariances[marker])
     if np.isfinite(variances).all() and (variances >= 0).all():
         more = float(by_calibration.at(state.marker_positions[marker])) if by_calibration.known else 0.0
-        spread = ", ".join(f"{math.hypot(math.sqrt(v), more) * 1e3:.2f}" for v in variances)
+        spread = ", ".join(f"{math.sqrt(v) * 1e3:.2f}" for v in variances)
         lines.append(tr("± {spread} mm (one sigma)", spread=spread) + (
             tr(", {more:.2f} mm of it by the calibration", more=1e3 * more) if more > 0.0 else ""))
     if not by_calibration.known:
@@ -194,7 +194,7 @@ def angle_text(angle_rad: float, sd_rad: float = math.nan) -> str:
 
 def palm_text(state: HandState, by_calibration: CalibrationAccuracy = KNOWN_EXACTLY) -> str:
     """How well the palm is known, e.g. "± 0.40 mm, ± 1.2°", worst axes; "" when that is not known."""
-    place = sd_text(float(total_sd(state.palm_covariance[:3, :3], state.world_from_palm[:3, 3], by_calibration)))
+    place = sd_text(float(total_sd(state.palm_covariance[:3, :3], by_calibration)))
     turn = math.degrees(float(worst_sd(state.palm_covariance[3:, 3:])))
     return f"{place}, ± {turn:.1f}°" if place and math.isfinite(turn) else ""
 

@@ -92,7 +92,7 @@ class Spot:
 
     def text(self, by_calibration: CalibrationAccuracy) -> str:
         """Its tooltip."""
-        spread = sd_text(float(total_sd(self.covariance, self.place, by_calibration)))
+        spread = sd_text(float(total_sd(self.covariance, by_calibration)))
         unknown = by_calibration.reason or tr("its uncertainty is not estimated")
         lines = [f"{self.name}: {tr(KNOWLEDGE[self.knowledge].word)}",
                  tr("{spread} along the worst axis (one sigma)", spread=spread) if spread else unknown,

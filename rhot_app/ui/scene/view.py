@@ -310,7 +310,7 @@ class SceneView(GLViewWidget):
             self._labels.paint_apart(painter, matrix, size, places, names, style)
         if self.actors is not None:
             text = ellipsoid_text(self._ellipsoids, cut=self._state is not None and self.actors.cut,
-                                  pictures_alone=self._by_calibration.sd_m != 0.0)
+                                  pictures_alone=not self._by_calibration.known)
             self.legend.paint(painter, size, self._scheme, text, self.tracker_word)
 
 
