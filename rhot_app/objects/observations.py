@@ -101,11 +101,13 @@ class ObjectPoints:
     """The image points of an object: the corners of its tags, four by four, or the centres of its markers.
 
     `points` (P, 3) m, object frame. `tags` (P,): the number of the point's tag in the file, NO_TAG for a marker.
-    `normals` (P, 3): the outward normal of the point's tag; NaN for a marker. `sizes` (P,) m: side of the tag.
+    `normals` (P, 3): the outward normal of the point's tag; NaN for a marker. `sizes` (P,) m: side of the tag. `sized`:
+    the points' distances are known as prints are, better than markers' by a ruler.
     """
 
     def __init__(self, model: ObjectModel) -> None:
         self.name, self.families = model.name, tuple(sorted({tag.key[0] for tag in model.fiducials}))
+        self.sized = bool(model.fiducials)
         self._first = {tag.key: 4 * number for number, tag in enumerate(model.fiducials)}
         self._marker = {marker.marker: number for number, marker in enumerate(model.markers)}
         if model.fiducials:

@@ -22,10 +22,12 @@ from rhot_app.geometry.transforms import fit_rigid, inverse, rigid
 from rhot_app.geometry.triangulate import Outcome, cast, empty_rays, triangulate
 from rhot_app.objects.motion import (
     SIZE,
+    TURNS,
     TWIST,
     VELOCITY,
     CameraArrays,
     PointResidual,
+    TurnsPrior,
     VelocityPrior,
     state_of,
 )
@@ -54,7 +56,7 @@ _STARTS = 4  # refined of all, the best by the cost of all points
 class Mode:
     """A state that explains the observations: a local minimum of the cost.
 
-    `state` (18,) and `covariance` (n, n) in its tangent space as in `motion`: n is 6, the pose alone, or 12. `cost`:
+    `state` and `covariance` (n, n) in its tangent space as in `motion`: n is 6, the pose alone, or all of it. `cost`:
     -2 log posterior of `points` image points, up to a constant. `rms_px`: reprojection error. `probability` among all
     modes.
     """
@@ -114,12 +116,17 @@ def find_modes(points: ObjectPoints, cameras: CameraArrays, views: Sequence[Obje
     residuals = [point_residual(points, cameras, view, views[0].t_ns if moving else None) for view in views]
     starts = [start for view in views for start in _tag_starts(points, cameras, view)]
     starts += _triangulated_starts(points, cameras, views)
-    size, priors = (SIZE, [VelocityPrior()]) if moving else (TWIST, [])
-    ranked = sorted((_start(residuals, priors, state_of(start), size).cost, number)
-                    for number, start in enumerate(starts))
+    turns = cameras.turns if moving else 0
+    size, priors = TWIST, list[Residual]()
+    if moving and starts:
+        size = SIZE + turns
+        expected = cameras.turns_covariance(starts[0][:3, 3], sized=points.sized)
+        priors = [VelocityPrior(), *([TurnsPrior(expected)] if turns else [])]
+    states = [state_of(start, turns) for start in starts]
+    ranked = sorted((_start(residuals, priors, state, size).cost, number) for number, state in enumerate(states))
     modes: list[Mode] = []
     for _, number in ranked[:_STARTS]:
-        _add(modes, refine(residuals, priors, state_of(starts[number]), size))
+        _add(modes, refine(residuals, priors, states[number], size))
     modes.sort(key=lambda mode: mode.cost)
     if modes:
         best = modes[0].state
@@ -131,10 +138,11 @@ def find_modes(points: ObjectPoints, cameras: CameraArrays, views: Sequence[Obje
 
 
 def point_residual(points: ObjectPoints, cameras: CameraArrays, view: ObjectView, t_ns: int | None) -> PointResidual:
-    """The residual of a view by the state at `t_ns`; None: of an object at rest."""
+    """The residual of a view by the state at `t_ns`; None: of an object at rest, before cameras that are as said."""
     late_s = np.zeros_like(view.late_s) if t_ns is None else view.late_s + 1e-9 * (view.t_ns - t_ns)
     return PointResidual(points.points[view.rows], view.pixels, view.covariances + FLOOR_PX**2 * np.eye(2), late_s,
-                         cameras.poses[view.camera], cameras.intrinsics[view.camera])
+                         cameras.poses[view.camera], cameras.intrinsics[view.camera],
+                         -1 if t_ns is None else cameras.turn_at(view.camera))
 
 
 def faces_camera(points: ObjectPoints, cameras: CameraArrays, view: ObjectView, world_from_object: Array) -> Array:
@@ -198,7 +206,7 @@ def reversed_state(points: ObjectPoints, cameras: CameraArrays, view: ObjectView
     half_turns = [2.0 * np.outer(axis, axis) / (axis @ axis) - np.eye(3) for axis in (line_of_sight, normal)]
     rotation = half_turns[0] @ world_from_object[:3, :3] @ half_turns[1]
     translation = world_from_object[:3, :3] @ middle + world_from_object[:3, 3] - rotation @ middle
-    out = state_of(rigid(rotation, translation))
+    out = np.concatenate([state_of(rigid(rotation, translation)), state[TURNS]])
     out[VELOCITY][:3], out[VELOCITY][3:] = state[VELOCITY][:3], half_turns[0] @ state[VELOCITY][3:]
     return out
 
@@ -214,7 +222,7 @@ def _start(residuals: Sequence[PointResidual], priors: Sequence[Residual], state
                 for one in (*points, *(prior.linearise(state) for prior in priors))]
 
     def moved(state: Array, step: Array) -> Array:
-        return np.asarray(retract(state, np.concatenate([step, np.zeros(SIZE - size)])))
+        return np.asarray(retract(state, np.concatenate([step, np.zeros(len(state) - TWIST - size)])))
     return Dense(state, rows, moved, size)
 
 

@@ -22,7 +22,7 @@ from rhot_app.estimation.residual import Process, Residual
 from rhot_app.estimation.se3 import difference
 from rhot_app.estimation.track import PREDICTED_NS, Life, TrackFilter
 from rhot_app.geometry.camera import CameraModel
-from rhot_app.objects.motion import SIZE, TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior
+from rhot_app.objects.motion import TWIST, VELOCITY, CameraArrays, ObjectProcess, StatePrior
 from rhot_app.objects.object_file import ObjectModel, require_distinct
 from rhot_app.objects.observations import FiducialFrame, FrameOfObjects, ObjectPoints, ObjectView, PictureFrame
 from rhot_app.objects.pose import (
@@ -87,7 +87,7 @@ class Measurement(Protocol):
         ...
 
     def gate(self, state: Array, covariance: Array) -> Gated:
-        """What a predicted state with covariance (12, 12) accepts of it."""
+        """What a predicted state with its covariance accepts of it."""
         ...
 
     def pair(self, state: Array, prediction: Estimate) -> tuple[Mode, Mode] | None:
@@ -139,7 +139,7 @@ class PointMeasurement:
         if step @ np.linalg.solve(prediction[1][:TWIST, :TWIST], step) > EXCLUDED:
             return None
         residuals = [point_residual(self._points, self._cameras, self._view, self._view.t_ns)]
-        found = [refine(residuals, [StatePrior(*prediction)], start, SIZE) for start in (state, other)]
+        found = [refine(residuals, [StatePrior(*prediction)], start, len(prediction[1])) for start in (state, other)]
         if found[0] is None or found[1] is None or same_pose(found[0].state, found[0].covariance, found[1].state,
                                                              found[1].covariance):
             return None
@@ -147,7 +147,7 @@ class PointMeasurement:
 
 
 def _innovation_cost(error: Array, jacobian: Array, covariance: Array) -> float:
-    """-2 log likelihood, up to a constant, of a whitened innovation (K,) with `jacobian` (K, 12)."""
+    """-2 log likelihood, up to a constant, of a whitened innovation (K,) with `jacobian` (K, n)."""
     total = jacobian @ covariance @ jacobian.T + np.eye(len(error))
     return float(error @ np.linalg.solve(total, error) + np.linalg.slogdet(total)[1])
 
@@ -191,6 +191,10 @@ class ObjectTrack:
     def ingest(self, frame: FrameOfObjects) -> None:
         """Weigh what one frame has of the object; nothing where only poses come."""
 
+    def begun(self, mode: Mode) -> Estimate:
+        """The estimate that a measurement's mode begins a hypothesis with."""
+        return mode.state, mode.covariance
+
     def predicts(self, measurement: Measurement) -> bool:
         """Whether a hypothesis accepts a measurement; False without a track."""
         t_ns = measurement.t_ns
@@ -232,7 +236,7 @@ class ObjectTrack:
         self._hypotheses.clear()
         for mode in modes:
             started = TrackFilter(self._process)
-            started.begin(measurement.t_ns, mode.state, mode.covariance)
+            started.begin(measurement.t_ns, *self.begun(mode))
             self._hypotheses.append(_Hypothesis(started, math.log(max(mode.probability, 1e-300))))
         self._normalise()
         return True
@@ -303,8 +307,9 @@ class RigidTrack(ObjectTrack):
 
     def __init__(self, model: ObjectModel, cameras: CameraArrays, diagnostics: Diagnostics,
                  camera_names: Sequence[str]) -> None:
-        super().__init__(model.name)
         self._points, self._cameras = ObjectPoints(model), cameras
+        self._rigid = ObjectProcess(cameras, sized=self._points.sized)
+        super().__init__(model.name, self._rigid)
         self._diagnostics, self._camera_names = diagnostics, camera_names
 
     def reset(self) -> None:
@@ -323,6 +328,10 @@ class RigidTrack(ObjectTrack):
                       if camera != view.camera and abs(view.t_ns - other.t_ns) < PREDICTED_NS]
             self._newest[view.camera] = view
             self.take(PointMeasurement(self._points, self._cameras, view, others))
+
+    def begun(self, mode: Mode) -> Estimate:
+        """See `ObjectTrack`."""
+        return self._rigid.with_turns(mode.state, mode.covariance)
 
     def _chosen(self, frame: FiducialFrame) -> list[int]:
         """Of each tag that is seen more than once the copy that alone fits the prediction, if there is one."""
@@ -344,12 +353,13 @@ class ObjectTracker:
 
     def __init__(self, objects: Sequence[ObjectModel], cameras: Sequence[CameraModel],
                  diagnostics: Diagnostics | None = None, camera_names: Sequence[str] = (),
-                 further: Sequence[ObjectTrack] = ()) -> None:
+                 further: Sequence[ObjectTrack] = (), reference: int = 0, turn_sd: Array | None = None) -> None:
         """`diagnostics` takes what it fails over and warns of, by `camera_names`. `further`: tracks of other objects.
-        Raises ObjectError when two objects cannot be told apart."""
+        `reference`, `turn_sd`: as `CameraArrays`. Raises ObjectError when two objects cannot be told apart."""
         require_distinct(objects, [one.name for one in objects])
         self._diagnostics = Diagnostics() if diagnostics is None else diagnostics
-        names, arrays = camera_names or [str(number) for number in range(len(cameras))], CameraArrays.of(list(cameras))
+        names = camera_names or [str(number) for number in range(len(cameras))]
+        arrays = CameraArrays.of(list(cameras), reference, turn_sd)
         self.tracks = [*(RigidTrack(one, arrays, self._diagnostics, names) for one in objects), *further]
 
     def take(self, frame: FrameOfObjects) -> None:

@@ -30,7 +30,7 @@ from rhot_app.objects.stream import PoseMeasurement
 from rhot_app.objects.track import ObjectTrack, ObjectTracker
 from rhot_app.project import Rig
 from rhot_app.state import HandState
-from rhot_app.tracking.markers.marker_model import scaled_table
+from rhot_app.tracking.markers.marker_model import scaled_table, turn_sds
 from rhot_app.tracking.tracker import CameraObservations
 
 Array = NDArray[np.float64]
@@ -44,7 +44,9 @@ class RigObjects:
         """`diagnostics` takes what is failed over or ambiguous. `articulated`: tracks of objects that the rig does not
         have, which follow its own. Raises RigError when the mesh of an object cannot be used."""
         cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
-        self._tracker = ObjectTracker(rig.models, cameras, diagnostics, [node.name for node in rig.nodes], articulated)
+        reference = rig.tracked_with.index(True)
+        self._tracker = ObjectTracker(rig.models, cameras, diagnostics, [node.name for node in rig.nodes], articulated,
+                                      reference, turn_sds(rig, reference))
         ids, self._tracked_with = rig.markers.ids, rig.tracked_with
         worn = [marker.marker for model in rig.models for marker in model.markers]
         self._columns = np.array([ids.index(name) for name in worn], np.intp)

@@ -36,7 +36,7 @@ def moving_state(seed: int) -> np.ndarray:
 def numeric(function, state: np.ndarray, step: float = 1e-6) -> np.ndarray:
     process = ObjectProcess()
     columns = [(function(process.retract(state, step * axis)) - function(process.retract(state, -step * axis)))
-               / (2.0 * step) for axis in np.eye(SIZE)]
+               / (2.0 * step) for axis in np.eye(len(state) - 6)]
     return np.stack(columns, axis=-1)
 
 
@@ -51,6 +51,18 @@ def test_the_projections_jacobian_is_that_of_finite_differences(seed: int, camer
     _, jacobian = residual.predict(state)
     expected = numeric(lambda moved: residual.predict(moved)[0], state)
     np.testing.assert_allclose(jacobian, expected, rtol=1e-6, atol=1e-4)
+
+
+@pytest.mark.parametrize(("camera", "reference"), [(0, 1), (1, 0), (0, 0)])
+def test_the_projections_jacobian_has_the_turn_of_its_camera(camera: int, reference: int) -> None:
+    rng, cameras = np.random.default_rng(4), CameraArrays.of(wide_cameras(), reference)
+    residual = PointResidual(0.03 * rng.normal(size=(7, 3)), np.zeros((7, 2)), np.tile(np.eye(2), (7, 1, 1)),
+                             0.02 * rng.normal(size=7), cameras.poses[camera], cameras.intrinsics[camera],
+                             cameras.turn_at(camera))
+    state = np.concatenate([moving_state(3), [0.02, -0.01, 0.03]])
+    _, jacobian = residual.predict(state)
+    np.testing.assert_allclose(jacobian, numeric(lambda moved: residual.predict(moved)[0], state), rtol=1e-6, atol=1e-3)
+    assert np.any(jacobian[:, :, SIZE:]) == (camera != reference)
 
 
 def test_a_projection_is_the_camera_models() -> None:

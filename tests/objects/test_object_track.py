@@ -15,7 +15,9 @@ from object_scenes import CUBE, PERIOD_NS, ROW_NS, TAG, hand_poses, observe, tak
 from rhot_app.diagnostics import Diagnostics
 from rhot_app.errors import ObjectError
 from rhot_app.estimation.se3 import exp_so3, log_so3
+from rhot_app.geometry.camera import CameraModel
 from rhot_app.geometry.transforms import rigid
+from rhot_app.geometry.turns import HELD_SD_RAD
 from rhot_app.objects.object_file import ObjectModel, plate
 from rhot_app.objects.observations import FiducialFrame
 from rhot_app.objects.pose import Mode
@@ -64,6 +66,46 @@ def nees(states: list[ObjectState], poses: Poses) -> float:
                                 log_so3(state.world_from_object[:3, :3] @ true[:3, :3].T)])
         squares.append(error @ np.linalg.solve(state.covariance, error))
     return float(np.mean(squares)) / 6.0
+
+
+def seen_by(cameras: list[CameraModel], stream: list[FiducialFrame], turn_sd: float) -> list[ObjectState]:
+    """The last second's states, by a rig that has `cameras` with turns of `turn_sd`, rad."""
+    tracker = ObjectTracker([CUBE], cameras, turn_sd=np.full(len(cameras), turn_sd))
+    return [taken(tracker, frame)[0] for frame in stream][-2 * round(1e9 / PERIOD_NS):]
+
+
+def turned(turn: tuple[float, float, float]) -> list[CameraModel]:
+    """The cameras, the second one turned by a rotation vector (3,) rad about its own axes."""
+    pose = np.eye(4)
+    pose[:3, :3] = exp_so3(turn)
+    camera_from_world = pose @ CAMERAS[1].camera_from_world
+    return [CAMERAS[0], replace(CAMERAS[1], camera_from_world=camera_from_world,
+                                world_from_camera=np.linalg.inv(camera_from_world))]
+
+
+@cache
+def cube_at_rest() -> tuple[list[FiducialFrame], list[ObjectState]]:
+    """Its frames, and its states by the cameras as they are."""
+    stream = frames(CUBE, in_hand("rest"), 2.5, 3)
+    return stream, seen_by(CAMERAS, stream, HELD_SD_RAD)
+
+
+@pytest.mark.parametrize("turn", [(1e-3, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 3.5e-3), (-3.5e-3, 0.0, 0.0)], ids=str)
+def test_cameras_that_contradict_each_other_neither_move_nor_shake_an_object(turn: tuple[float, float, float]) -> None:
+    """Tags show every turn, so their own lengths decide: half a pixel moved a cube by three standard deviations."""
+    poses, (stream, exact) = in_hand("rest"), cube_at_rest()
+    states = seen_by(turned(turn), stream, 1e-3)
+    assert all(state.validity is Validity.TRACKED for state in states)
+    distances, angles = (np.sqrt(np.mean(np.square(one))) for one in errors(states, poses))
+    expected = [np.sqrt(np.mean(np.square(one))) for one in errors(exact, poses)]
+    assert distances < 1.15 * expected[0] and angles < 1.15 * expected[1]
+    assert nees(states, poses) < 1.5 * nees(exact, poses)
+
+
+def test_cameras_that_are_believed_exactly_contradict_each_other() -> None:
+    poses, (stream, exact) = in_hand("rest"), cube_at_rest()
+    states = seen_by(turned((0.0, 1e-3, 0.0)), stream, HELD_SD_RAD)
+    assert nees(states, poses) > 5.0 * nees(exact, poses)
 
 
 @cache
