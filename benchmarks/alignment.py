@@ -21,15 +21,15 @@ from tables import arguments, publish, table
 
 from rhot_app.estimation.se3 import log_so3
 from rhot_app.geometry.transforms import apply, inverse
-from rhot_app.objects.alignment.report import AlignmentReport, calibrate_alignment
+from rhot_app.objects.alignment.report import AlignmentSolution, calibrate_alignment
 
 TARGETS = {"origin mm": 0.5, "motion mm": 0.5, "point mm": 0.5, "rotation deg": 0.1, "offset ms": 1.0}
 
 
-def errors_of(report: AlignmentReport, scene: Any) -> dict[str, float]:
+def errors_of(solution: AlignmentSolution, scene: Any) -> dict[str, float]:
     """By name: of the other world's origin, of a position in the middle of the motion, of the point on the tracker, of
     the rotation and the time offset; and NEES."""
-    fit, truth = report.fit, scene.rig_from_foreign
+    fit, truth = solution.fit, scene.rig_from_foreign
     turn = log_so3(fit.rig_from_foreign[:3, :3] @ truth[:3, :3].T)
     origin, point = (fit.rig_from_foreign - truth)[:3, 3], (fit.tracker_from_body - scene.tracker_from_body)[:3, 3]
     offset = fit.offset_s - scene.offset_s

@@ -21,7 +21,7 @@ from bones_twin import RICH, SIX, Sloppiness, base_hand, bones_mm, person, recor
 from tables import arguments, publish, table
 
 from rhot_app.calibration.hand.bones import solve_bones
-from rhot_app.calibration.hand.bones_report import BonesReport, Known
+from rhot_app.calibration.hand.bones_result import BonesResult, Known
 from rhot_app.calibration.hand.bundle_model import Poses, expected
 from rhot_app.calibration.hand.marker_places import MarkerTracks, tracks_of
 from rhot_app.calibration.hand.shape import HandUnknowns
@@ -52,9 +52,9 @@ def plain_average(tracks: MarkerTracks, base: HandAnatomy) -> Array:
     return out
 
 
-def lengths_mm(report: BonesReport) -> Array:
+def lengths_mm(result: BonesResult) -> Array:
     """(5, 3) mm."""
-    return np.array([bone.length_mm for bone in report.bones]).reshape(5, 3)
+    return np.array([bone.length_mm for bone in result.bones]).reshape(5, 3)
 
 
 def rich_twin(persons: int, noise_mm: float) -> list[dict[str, Any]]:
@@ -65,10 +65,10 @@ def rich_twin(persons: int, noise_mm: float) -> list[dict[str, Any]]:
         hand = person(seed, side=side)
         tracks = record(hand, RICH, seed, sloppiness=Sloppiness(noise_m=1e-3 * noise_mm))
         begun = time.perf_counter()
-        report = solve_bones(tracks, base_hand(side))
-        errors = lengths_mm(report) - bones_mm(hand)
+        result = solve_bones(tracks, base_hand(side))
+        errors = lengths_mm(result) - bones_mm(hand)
         plain = np.abs(plain_average(tracks, base_hand(side)) - bones_mm(hand))
-        deviations = np.array([bone.std_mm for bone in report.bones]).reshape(5, 3)
+        deviations = np.array([bone.std_mm for bone in result.bones]).reshape(5, 3)
         rows.append({"person": seed, "side": side, "noise_mm": noise_mm, "worst_mm": float(np.abs(errors).max()),
                      "inner_bones_mm": float(np.abs(errors[:, :2]).max()),
                      "rms_mm": float(np.sqrt(np.mean(errors ** 2))),
@@ -92,8 +92,8 @@ def real_halves() -> dict[str, Any] | None:
     apart = np.abs(lengths_mm(reports[0]) - lengths_mm(reports[1]))
     plain = np.abs(np.subtract(*(plain_average(half, base_hand()) for half in halves)))
     return {"worst_mm": float(apart.max()), "rms_mm": float(np.sqrt(np.mean(apart ** 2))),
-            "plain_worst_mm": float(plain.max()), "sizes": [report.size for report in reports],
-            "observed": [sum(bone.known is not Known.PRIOR for bone in report.bones) for report in reports]}
+            "plain_worst_mm": float(plain.max()), "sizes": [result.size for result in reports],
+            "observed": [sum(bone.known is not Known.PRIOR for bone in result.bones) for result in reports]}
 
 
 def six_markers(persons: int) -> list[dict[str, Any]]:
@@ -103,13 +103,13 @@ def six_markers(persons: int) -> list[dict[str, Any]]:
     for seed in range(persons):
         hand = person(seed)
         tracks = record(hand, SIX, seed, rate_hz=40.0, sloppiness=Sloppiness(noise_m=0.5e-3))
-        report = solve_bones(tracks, base)
+        result = solve_bones(tracks, base)
         truth = HandUnknowns(hand, ()).shape(HandUnknowns(hand, ()).prior.mean).reaches
         usual = HandUnknowns(base, ()).shape(HandUnknowns(base, ()).prior.mean).reaches
         size = float(np.mean(truth[1:] / usual[1:]))
-        rows.append({"person": seed, "size": size, "size_error": report.size / size - 1.0,
-                     "stated_std": report.size_std,
-                     "not_observed": sum(bone.known is Known.PRIOR for bone in report.bones)})
+        rows.append({"person": seed, "size": size, "size_error": result.size / size - 1.0,
+                     "stated_std": result.size_std,
+                     "not_observed": sum(bone.known is Known.PRIOR for bone in result.bones)})
     say(f"six markers: {persons} persons solved")
     return rows
 

@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT / "tests" / "calibration"))
 from colour_twin import SKIN, WOOD_RGB, HandScene, calibrate, repainted, tally  # noqa: E402
 from tables import arguments, publish, table  # noqa: E402
 
-from rhot_app.calibration.colour.colours import ColourReport  # noqa: E402
+from rhot_app.calibration.colour.colours import ColourResult  # noqa: E402
 from rhot_app.calibration.verdict import Grade  # noqa: E402
 from rhot_node.files import resource_path  # noqa: E402
 from rhot_node.markers import load_markers  # noqa: E402
@@ -55,12 +55,12 @@ def lamps(background: str, seeds: int, frames: int) -> dict[str, Any]:
     warned = 0
     for seed in range(1, seeds + 1):
         scene = HandScene(background, seed)
-        report = calibrate(scene, LEARN_S, LEARNT_KELVINS[(seed - 1) % 3])
-        warned += sum(finding.code in WARNINGS for finding in report.verdict.findings)
+        result = calibrate(scene, LEARN_S, LEARNT_KELVINS[(seed - 1) % 3])
+        warned += sum(finding.code in WARNINGS for finding in result.verdict.findings)
         for kelvin in KELVINS:
             for brightness in BRIGHTNESSES:
                 shown = list(scene.frames(np.arange(frames) * 0.43 + 3.1, kelvin, brightness))
-                for name, markers in (("learnt", report.markers), ("nominal", scene.markers)):
+                for name, markers in (("learnt", result.markers), ("nominal", scene.markers)):
                     for way in ("stills", "tracked"):
                         got = tally(markers, shown, way == "stills")
                         counts = np.array([got.visible.sum(), got.lost.sum(), got.misplaced.sum()])
@@ -73,17 +73,17 @@ def paint(name: str, target: str, share: float, frames: int, number: int) -> lis
     seed, kelvin = 11 + number % 5, LEARNT_KELVINS[number % 3]
     scene = HandScene("cloth" if target != "wood" else "clutter", seed,
                       markers=repainted(MARKERS, name, TARGETS[target], share))
-    report = calibrate(scene, LEARN_S, kelvin)
+    result = calibrate(scene, LEARN_S, kelvin)
     shown = [frame for kelvin in KELVINS[::2] for brightness in BRIGHTNESSES[::2]
              for frame in scene.frames(np.arange(frames) * 0.61 + 3.1, kelvin, brightness)]
-    failed = np.maximum(*(tally(report.markers, shown, stills).failed for stills in (True, False)))
-    return [{"mixed": name, "towards": target, "share": share, "marker": marker, "said": said_of(report, marker),
+    failed = np.maximum(*(tally(result.markers, shown, stills).failed for stills in (True, False)))
+    return [{"mixed": name, "towards": target, "share": share, "marker": marker, "said": said_of(result, marker),
              "failed": round(float(part), 3)} for marker, part in zip(scene.markers.ids, failed, strict=True)]
 
 
-def said_of(report: ColourReport, name: str) -> list[str]:
+def said_of(result: ColourResult, name: str) -> list[str]:
     """Codes of the findings that concern a marker."""
-    return [finding.code for finding in report.verdict.findings
+    return [finding.code for finding in result.verdict.findings
             if finding.grade is not Grade.GOOD and re.search(rf"\b{name}\b", finding.figure)]
 
 

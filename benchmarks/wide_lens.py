@@ -28,7 +28,7 @@ from tables import arguments, publish, table  # noqa: E402
 
 from rhot_app.calibration.lens.fit import find_lens  # noqa: E402
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig  # noqa: E402
-from rhot_app.calibration.stereo.report import StereoFigures  # noqa: E402
+from rhot_app.calibration.stereo.result import StereoFigures  # noqa: E402
 from rhot_app.estimation.se3 import exp_so3, quaternion_from_rotation  # noqa: E402
 from rhot_app.evaluation.accuracy import Figures, accuracy, deviations, pooled, worn_by  # noqa: E402
 from rhot_app.evaluation.compare import TRACKERS  # noqa: E402

@@ -97,7 +97,8 @@ def measure(seconds: float, shots: int) -> dict[str, Any]:
             opened = session.open_twin(TwinChoice("grasp"), lambda text, fraction: None)
             with session.client() as client:
                 client.command("start")
-            feed = LiveFeed({node.name: node.node_id for node in opened.rig.nodes}, session.asker, rate_hz=30.0).start()
+            cameras = {node.name: node.node_id for node in opened.rig.nodes}
+            feed = LiveFeed(cameras, session.command_client, rate_hz=30.0).start()
             time.sleep(2.0)
             alone = watch(session, feed, seconds)
             worker = threading.Thread(target=solve_again_and_again,

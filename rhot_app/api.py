@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhot_app.calibration.board.boards import AprilGrid, Board, CharucoBoard, Chessboard, CircleGrid
-from rhot_app.calibration.stereo.report import StereoReport
+from rhot_app.calibration.stereo.result import StereoResult
 from rhot_app.engine.client import EngineClient
 from rhot_app.errors import CalibrationError, EngineError, ExportError, RecordingError, RhotError, RigError
 from rhot_app.export.export import Exported, export_log
@@ -145,7 +145,7 @@ class StereoCalibration:
     """What came of a stereo calibration. `rig`: with the new lenses and places, None when there is no result or it must
     not be used; `report` has the figures, `report.verdict` and `summary` say how good it is."""
 
-    report: StereoReport
+    report: StereoResult
     rig: Rig | None
 
     @property

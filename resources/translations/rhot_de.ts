@@ -4772,6 +4772,226 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Fingerwurzeln</translation>
     </message>
     <message>
+        <source>CMC abduction</source>
+        <translation>CMC Abduktion</translation>
+    </message>
+    <message>
+        <source>CMC flexion</source>
+        <translation>CMC Beugung</translation>
+    </message>
+    <message>
+        <source>DIP flexion</source>
+        <translation>DIP Beugung</translation>
+    </message>
+    <message>
+        <source>From joint to joint; the last bone ends at the fingertip.</source>
+        <translation>Von Gelenk zu Gelenk; der letzte Knochen endet an der Fingerspitze.</translation>
+    </message>
+    <message>
+        <source>Half of the thickness.</source>
+        <translation>Die Hälfte der Dicke.</translation>
+    </message>
+    <message>
+        <source>IP flexion</source>
+        <translation>IP Beugung</translation>
+    </message>
+    <message>
+        <source>MCP abduction</source>
+        <translation>MCP Abduktion</translation>
+    </message>
+    <message>
+        <source>MCP flexion</source>
+        <translation>MCP Beugung</translation>
+    </message>
+    <message>
+        <source>Of the forearm behind the wrist.</source>
+        <translation>Des Unterarms hinter dem Handgelenk.</translation>
+    </message>
+    <message>
+        <source>Of the wrist in the rig&apos;s frame.</source>
+        <translation>Des Handgelenks im Koordinatensystem des Rigs.</translation>
+    </message>
+    <message>
+        <source>PIP flexion</source>
+        <translation>PIP Beugung</translation>
+    </message>
+    <message>
+        <source>Relative to the hand of the beginning: all phalanges, beside the size of the whole hand.</source>
+        <translation>Im Verhältnis zur Hand des Anfangs: alle Fingerglieder, neben der Größe der ganzen Hand.</translation>
+    </message>
+    <message>
+        <source>Relative to the hand of the beginning: all radii but the forearm&apos;s, and the palm&apos;s thickness.</source>
+        <translation>Im Verhältnis zur Hand des Anfangs: alle Radien außer denen des Unterarms, und die Dicke der Handfläche.</translation>
+    </message>
+    <message>
+        <source>Relative to the hand of the beginning: every length.</source>
+        <translation>Im Verhältnis zur Hand des Anfangs: jede Länge.</translation>
+    </message>
+    <message>
+        <source>Relative to the hand of the beginning: the forearm&apos;s thickness.</source>
+        <translation>Im Verhältnis zur Hand des Anfangs: die Dicke des Unterarms.</translation>
+    </message>
+    <message>
+        <source>The palm turns about its axes, z first, then y, then x.</source>
+        <translation>Die Handfläche dreht sich um ihre Achsen, zuerst z, dann y, dann x.</translation>
+    </message>
+    <message>
+        <source>Where the finger begins, from the wrist joint: towards the fingertips, towards the thumb, and out of the back of the hand.</source>
+        <translation>Wo der Finger beginnt, vom Handgelenk aus: zu den Fingerspitzen hin, zum Daumen hin und aus dem Handrücken heraus.</translation>
+    </message>
+    <message>
+        <source>Within the limits of the hand file.</source>
+        <translation>Innerhalb der Grenzen der Handdatei.</translation>
+    </message>
+    <message>
+        <source>deviation</source>
+        <translation>Abweichung zur Seite</translation>
+    </message>
+    <message>
+        <source>fingers</source>
+        <translation>Finger</translation>
+    </message>
+    <message>
+        <source>flexion</source>
+        <translation>Beugung</translation>
+    </message>
+    <message>
+        <source>forearm</source>
+        <translation>Unterarm</translation>
+    </message>
+    <message>
+        <source>index distal</source>
+        <translation>Zeigefinger distal</translation>
+    </message>
+    <message>
+        <source>index dorsal</source>
+        <translation>Zeigefinger dorsal</translation>
+    </message>
+    <message>
+        <source>index medial</source>
+        <translation>Zeigefinger medial</translation>
+    </message>
+    <message>
+        <source>index proximal</source>
+        <translation>Zeigefinger proximal</translation>
+    </message>
+    <message>
+        <source>index radial</source>
+        <translation>Zeigefinger radial</translation>
+    </message>
+    <message>
+        <source>little distal</source>
+        <translation>kleiner Finger distal</translation>
+    </message>
+    <message>
+        <source>little dorsal</source>
+        <translation>kleiner Finger dorsal</translation>
+    </message>
+    <message>
+        <source>little medial</source>
+        <translation>kleiner Finger medial</translation>
+    </message>
+    <message>
+        <source>little proximal</source>
+        <translation>kleiner Finger proximal</translation>
+    </message>
+    <message>
+        <source>little radial</source>
+        <translation>kleiner Finger radial</translation>
+    </message>
+    <message>
+        <source>middle distal</source>
+        <translation>Mittelfinger distal</translation>
+    </message>
+    <message>
+        <source>middle dorsal</source>
+        <translation>Mittelfinger dorsal</translation>
+    </message>
+    <message>
+        <source>middle medial</source>
+        <translation>Mittelfinger medial</translation>
+    </message>
+    <message>
+        <source>middle proximal</source>
+        <translation>Mittelfinger proximal</translation>
+    </message>
+    <message>
+        <source>middle radial</source>
+        <translation>Mittelfinger radial</translation>
+    </message>
+    <message>
+        <source>ring distal</source>
+        <translation>Ringfinger distal</translation>
+    </message>
+    <message>
+        <source>ring dorsal</source>
+        <translation>Ringfinger dorsal</translation>
+    </message>
+    <message>
+        <source>ring medial</source>
+        <translation>Ringfinger medial</translation>
+    </message>
+    <message>
+        <source>ring proximal</source>
+        <translation>Ringfinger proximal</translation>
+    </message>
+    <message>
+        <source>ring radial</source>
+        <translation>Ringfinger radial</translation>
+    </message>
+    <message>
+        <source>thickness</source>
+        <translation>Dicke</translation>
+    </message>
+    <message>
+        <source>thumb distal</source>
+        <translation>Daumen distal</translation>
+    </message>
+    <message>
+        <source>thumb dorsal</source>
+        <translation>Daumen dorsal</translation>
+    </message>
+    <message>
+        <source>thumb metacarpal</source>
+        <translation>Daumen metakarpal</translation>
+    </message>
+    <message>
+        <source>thumb proximal</source>
+        <translation>Daumen proximal</translation>
+    </message>
+    <message>
+        <source>thumb radial</source>
+        <translation>Daumen radial</translation>
+    </message>
+    <message>
+        <source>turn about x</source>
+        <translation>Drehung um x</translation>
+    </message>
+    <message>
+        <source>turn about y</source>
+        <translation>Drehung um y</translation>
+    </message>
+    <message>
+        <source>turn about z</source>
+        <translation>Drehung um z</translation>
+    </message>
+    <message>
+        <source>whole hand</source>
+        <translation>ganze Hand</translation>
+    </message>
+    <message>
+        <source>x</source>
+        <translation>x</translation>
+    </message>
+    <message>
+        <source>y</source>
+        <translation>y</translation>
+    </message>
+    <message>
+        <source>z</source>
+        <translation>z</translation>
+    </message>
+    <message>
         <source>Hold still</source>
         <translation>Still halten</translation>
     </message>
@@ -5236,6 +5456,14 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
         <translation>Knoten {name} lässt sich nicht zur Videoaufnahme bringen: Sein Steuerkanal antwortet nicht.</translation>
     </message>
     <message>
+        <source>No video is recorded: {message}</source>
+        <translation>Es wird kein Video aufgenommen: {message}</translation>
+    </message>
+    <message>
+        <source>The video of node {name} has ended. {message}</source>
+        <translation>Das Video des Knotens {name} ist zu Ende. {message}</translation>
+    </message>
+    <message>
         <source>Node {name} drops frames of its video, {dropped} so far: its processor or disk is too slow. Detection goes first.</source>
         <translation>Knoten {name} lässt Bilder seines Videos aus, bisher {dropped}: Sein Prozessor oder seine Platte ist zu langsam. Die Erkennung geht vor.</translation>
     </message>
@@ -5250,6 +5478,10 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>Node {name} has learnt neither background nor skin, so no bare hand can be tracked by its contours. Use Calibrate, Background and skin.</source>
         <translation>Knoten {name} hat weder Hintergrund noch Haut gelernt, daher lässt sich keine bloße Hand über ihre Konturen verfolgen. Kalibrieren, Hintergrund und Haut benutzen.</translation>
+    </message>
+    <message>
+        <source>The engine stopped and was started again. The recording continues in {part}; what came before is in {before}.</source>
+        <translation>Die Engine ist stehen geblieben und wurde neu gestartet. Die Aufnahme geht in {part} weiter; was davor war, steht in {before}.</translation>
     </message>
     <message>
         <source>The new rig is being prepared; the one before is tracked until then.</source>
@@ -7086,6 +7318,10 @@ vor {reason}</translation>
     <message>
         <source>The code of other trackers and of calibrations is being compiled in the background, once: {done} of {steps} steps. It yields to the tracking, and takes minutes.</source>
         <translation>Der Rechencode anderer Tracker und der Kalibrierungen wird einmalig im Hintergrund übersetzt: {done} von {steps} Schritten. Er weicht der Verfolgung und braucht Minuten.</translation>
+    </message>
+    <message>
+        <source>{path} already exists. Write over it?</source>
+        <translation>{path} gibt es schon. Überschreiben?</translation>
     </message>
 </context>
 </TS>

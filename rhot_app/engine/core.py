@@ -67,7 +67,7 @@ class Engine:
         self._node_message = node_message
         self._node_black = node_black
         self._notice = ""  # why the last recording ended
-        self._continued = ""  # that this recording continues one of before a crash
+        self._continued: Advice | None = None  # that this recording continues one of before a crash
         self._moved: dict[int, str] = {}  # where nodes were that have moved since the rig was read or saved
         self._shown: dict[tuple[str, int], int] = {}  # times of the contours that were published last
         self._lock = threading.RLock()
@@ -130,7 +130,7 @@ class Engine:
             about = begun_now(time.monotonic_ns()) | ({"video": name} if video else {})
             if continues is not None:
                 about[CONTINUES] = continues.name
-            self._continued = ""
+            self._continued = None
             recorder = Recorder(path, self.rig, about)
             try:
                 self._source.record_to(recorder)
@@ -149,8 +149,9 @@ class Engine:
             self._notice = (f"The engine stopped and was started again. The recording was not continued: {exc} What "
                             f"came before is in {path}.")
             return
-        self._continued = (f"The engine stopped and was started again. The recording continues in {part.name}; what "
-                           f"came before is in {path.name}.")
+        self._continued = advise("The engine stopped and was started again. The recording continues in {part}; what "
+                                 "came before is in {before}.", level="info", subject="information", part=part.name,
+                                 before=path.name)
 
     def record_stop(self) -> Path | None:
         """Finish the log; returns its path, or None when nothing was recorded."""
@@ -248,8 +249,8 @@ class Engine:
             if self.recorder is not None:
                 if self.recorder.notice:
                     extra.append(Advice("warning", self.recorder.notice, subject="recording"))
-                if self._continued:
-                    extra.append(Advice("info", self._continued, subject="information"))
+                if self._continued is not None:
+                    extra.append(self._continued)
                 extra += disk_advice(str(self.recorder.path.parent), self.recorder.disk.seconds_left)
             extra += moved_advice(self.rig, self._moved) + hands_advice(self.rig)
             since_s = self._preparing_s

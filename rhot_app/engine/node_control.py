@@ -281,8 +281,8 @@ def _take_video_answer(peer: _Peer, answer: Answer) -> None:
     if not peer.video:
         return
     if not answer.get("ok"):
-        peer.video_advice = (Advice("warning", f"No video is recorded: {answer.get('error')}",
-                                    subject="recording"),)
+        peer.video_advice = (advise("No video is recorded: {message}", subject="recording",
+                                    message=str(answer.get("error"))),)
         return
     video = answer.get("answer", {}).get("video")
     if not isinstance(video, dict):
@@ -290,7 +290,8 @@ def _take_video_answer(peer: _Peer, answer: Answer) -> None:
     name, message, dropped = peer.node.name, printable(str(video.get("message", ""))), video.get("dropped")
     peer.video_advice = ()
     if message:
-        peer.video_advice = (Advice("warning", f"The video of node {name} has ended. {message}", subject="recording"),)
+        peer.video_advice = (advise("The video of node {name} has ended. {message}", subject="recording", name=name,
+                                    message=message),)
     elif isinstance(dropped, int) and dropped > peer.video_dropped:
         peer.video_advice = (advise("Node {name} drops frames of its video, {dropped} so far: its processor or disk is "
                                     "too slow. Detection goes first.", subject="recording", name=name,

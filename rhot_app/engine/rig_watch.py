@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.barehand.key_frames import KeyFrame
-from rhot_app.calibration.hand.bones_report import BonesReport
+from rhot_app.calibration.hand.bones_result import BonesResult
 from rhot_app.calibration.hand.landmark_bones import measure_bones, spreads_apart
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.verdict import Verdict
@@ -181,7 +181,7 @@ class BonesWatch:
         self._columns = [roles.index(role) for role in LANDMARK_ROLES if role in roles]
         self._active = len(self._columns) == len(LANDMARK_ROLES) and len(rig.nodes) > 1
         self._seen: deque[tuple[float, Array]] = deque(maxlen=MAX_INSTANTS)
-        self._newest: BonesReport | None = None
+        self._newest: BonesResult | None = None
         self._offer: Advice | None = None
         self._shown: HandAnatomy | None = None
         self._sequence, self._judged_ns = -1, -BONES_JUDGE_NS
@@ -239,9 +239,9 @@ def _proposal(verdict: Verdict, rows: list[Any], rig: Rig) -> dict[str, Any]:
     return {"known": True, **verdict.to_json(), "rows": rows, "document": msgspec.to_builtins(rig)}
 
 
-def _apart_mm(report: BonesReport, hand: HandAnatomy) -> float:
+def _apart_mm(result: BonesResult, hand: HandAnatomy) -> float:
     others = np.array([one.bones_mm for one in hand.fingers.values()]).ravel()
-    return float(np.sqrt(np.mean((np.array([one.length_mm for one in report.bones]) - others) ** 2)))
+    return float(np.sqrt(np.mean((np.array([one.length_mm for one in result.bones]) - others) ** 2)))
 
 
 def _kept(tracker: Tracker) -> list[KeyFrame]:

@@ -35,12 +35,32 @@ class Actions(QObject):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self._make_recording()
+        self._make_simulated(parent)
+        self._make_rig(parent)
+        self._make_calibrate(parent)
+        self._make_view()
+        self._make_help()
+        for action, role in ((self.settings, QAction.MenuRole.PreferencesRole), (self.quit, QAction.MenuRole.QuitRole),
+                             (self.about, QAction.MenuRole.AboutRole)):
+            action.setMenuRole(role)
+        self._name()
+        for alternatives in ([self.dark, self.light], self.cloud_sizes):
+            group = QActionGroup(self)
+            for action in alternatives:
+                group.addAction(action)
+
+    def _make_recording(self) -> None:
+        """Start and stop, and what is recorded."""
         self.start = self._make(tr("Start"), "", tr("Tell the nodes to stream, or to stop."))
         self.record = self._make(tr("Record"), "R", tr("Write the raw log of all datagrams, or end it."))
         self.bookmark = self._make(tr("Bookmark"), "B", tr("Write a few words about this moment into the recording."))
         self.video = self._make(tr("Record video, too"), "",
                                 tr("Each camera writes its own frames as long as the next recording lasts. Rig, "
                                    "Recordings fetches them afterwards."), checkable=True)
+
+    def _make_simulated(self, parent: QWidget) -> None:
+        """The simulated rig and its scene."""
         self.twin = self._make(tr("Simulated rig"), "",
                                tr("Start two simulated cameras that look at a simulated hand."))
         self.shows = Menu(tr("Simulated hand does"), parent)
@@ -53,6 +73,9 @@ class Actions(QObject):
                                      tr("Write what the simulated rig is and shows to a file. Commands that simulate "
                                         "read it with --scene."))
         self.scene.addActions([self.open_scene, self.save_scene])
+
+    def _make_rig(self, parent: QWidget) -> None:
+        """Rigs, recordings, outputs, the settings."""
         self.open = self._make(tr("Open rig file …"), "Ctrl+O", tr("Open a rig that was set up before."))
         self.own_cameras = self._make(tr("Cameras of this computer …"), "",
                                       tr("Choose webcams, films or network cameras, look at them, and track with "
@@ -82,6 +105,9 @@ class Actions(QObject):
                                     tr("End what the app started and go back to the first page."))
         self.settings = self._make(tr("Settings …"), "Ctrl+,", tr("Look, folders, what opens at the start, and keys."))
         self.quit = self._make(tr("Quit"), "Ctrl+Q", tr("End what the app started and close it."))
+
+    def _make_calibrate(self, parent: QWidget) -> None:
+        """Calibrations, and what the rig file says."""
         self.next_steps = self._make(tr("What to do next …"), "",
                                      tr("Say what you have, and see the steps that are missing."))
         self.wizards = [self._make(f"{tr(wizard.title)} …", "", tr(wizard.meaning)) for wizard in calibrations()]
@@ -101,6 +127,9 @@ class Actions(QObject):
         self.properties.menuAction().setToolTip(tr("What the rig file says, to read."))
         self.properties.addActions([self.cameras, self.markers, self.hand])
         self.files = self._make(tr("How to calibrate"), "", tr("Opens the guide."))
+
+    def _make_view(self) -> None:
+        """What is drawn, and how."""
         self.frame = self._make(tr("Frame the hand"), "F", tr("Bring the hand into the middle of the scene."))
         self.home = self._make(tr("Reset the view"), "Home", tr("Back to the view from behind the cameras."))
         self.names = self._make(tr("Marker names"), "", tr("Names beside the markers in the scene."), checkable=True)
@@ -123,17 +152,12 @@ class Actions(QObject):
         self.dark = self._make(tr("Dark"), "", tr("Light text on dark ground."), checkable=True)
         self.light = self._make(tr("Light"), "", tr("Dark text on light ground."), checkable=True)
         self.reset = self._make(tr("Reset layout and settings"), "", tr("Forget layout, last rig and switches."))
+
+    def _make_help(self) -> None:
+        """The guide and the versions."""
         self.guide = self._make(tr("Guide"), "F1", tr("The page of the guide that explains the panel in use."))
         self.keys = self._make(tr("Keys"), "", tr("The guide's page about keys."))
         self.about = self._make(tr("About RHOT …"), "", tr("Versions for a report of a fault, and licences."))
-        for action, role in ((self.settings, QAction.MenuRole.PreferencesRole), (self.quit, QAction.MenuRole.QuitRole),
-                             (self.about, QAction.MenuRole.AboutRole)):
-            action.setMenuRole(role)
-        self._name()
-        for alternatives in ([self.dark, self.light], self.cloud_sizes):
-            group = QActionGroup(self)
-            for action in alternatives:
-                group.addAction(action)
 
     def _make(self, text: str, key: str, meaning: str, *, checkable: bool = False) -> QAction:
         action = QAction(text, self)

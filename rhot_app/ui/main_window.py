@@ -69,7 +69,7 @@ class MainWindow(QMainWindow):
         self.dialogs = Dialogs(self)
         self.recordings = Recordings(controller, settings, self.tell)
         self.rig_watch = RigFileWatch(controller)
-        self.wizards = Launcher(controller.backend.asker, controller.backend.client,
+        self.wizards = Launcher(controller.backend.command_client, controller.backend.client,
                                 lambda: self.appearance.scheme, settings, self, make_solver)
         self.replays = ReplayWindows(settings, lambda: self.appearance.scheme, self, lambda: controller.rig,
                                      make_solver)

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QSplitter, QVBoxLayout, 
 from rhot_app.project import Rig
 from rhot_app.state import Condition, HandState
 from rhot_app.ui.backend.live import SILENCE_S, Live
-from rhot_app.ui.common.scrolled import scrolled
+from rhot_app.ui.common.parts import scrolled
 from rhot_app.ui.language import tr
 from rhot_app.ui.models.pacing import FramePacer
 from rhot_app.ui.models.palette import Scheme

@@ -15,6 +15,7 @@ from rhot_app.ui.backend.contract import TwinChoice
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.menu import Menu, literal
+from rhot_app.ui.common.parts import ask_where_to_save
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.notice import Notice
 
@@ -184,6 +185,7 @@ class SceneFiles(QObject):
         super().__init__(window)
         self._controller, self._saving, self._tell = controller, saving, tell
         self._window = window
+        self._path = Path.home() / "scene.json"  # of the last scene
         self._job: Job | None = None
         opening.triggered.connect(self._open)
         saving.triggered.connect(self._save)
@@ -195,15 +197,16 @@ class SceneFiles(QObject):
         self._saving.setEnabled(opened is not None and opened.simulated)
 
     def _open(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self._window, tr("Open a scene"), "", tr(_SCENES))
+        name, _ = QFileDialog.getOpenFileName(self._window, tr("Open a scene"), str(self._path.parent), tr(_SCENES))
         if name:
+            self._path = Path(name)
             tracker = self._controller.twin_choice.tracker
-            self._controller.open_twin(TwinChoice(None, None, None, tracker, Path(name)))
+            self._controller.open_twin(TwinChoice(None, None, None, tracker, self._path))
 
     def _save(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self._window, tr("Save the scene"), "scene.json", tr(_SCENES))
-        if name and self._job is None:
-            path = Path(name)
+        path = ask_where_to_save(self._window, tr("Save the scene"), self._path, tr(_SCENES))
+        if path is not None and self._job is None:
+            self._path = path
             self._job = Job(lambda progress: self._controller.backend.save_scene(path), lambda _: self._saved(path),
                             self._fail, parent=self).start()
 

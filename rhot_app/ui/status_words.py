@@ -12,7 +12,7 @@ from rhot_app.calibration.registry import find_calibration
 from rhot_app.engine.status import Advice, EngineStatus, with_numbers
 from rhot_app.errors import RigError
 from rhot_app.project import Rig, load_rig, parse_rig
-from rhot_app.ui.backend.contract import Asker, TwinPace
+from rhot_app.ui.backend.contract import CommandClient, TwinPace
 from rhot_app.ui.common.controller import RESTART_ENGINE, RESTART_TWIN, Controller
 from rhot_app.ui.language import tr
 from rhot_app.ui.models.notice import Notice
@@ -133,7 +133,7 @@ class RigObservation:
     edited: bool
 
 
-def look_at_rig(client: Asker) -> RigObservation:
+def look_at_rig(client: CommandClient) -> RigObservation:
     """Ask the engine and read the file. Waits; raises EngineError, RigError."""
     answer = client.command("rig")
     path = str(answer.get("path", ""))

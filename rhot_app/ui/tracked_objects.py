@@ -15,7 +15,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
 from rhot_app.project import Rig, parse_rig, with_object
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import CommandClient
 from rhot_app.ui.common.controller import Controller
 from rhot_app.ui.common.menu import literal
 from rhot_app.ui.language import tr, tr_noop
@@ -80,7 +80,7 @@ class TrackedObjects(QObject):
         self._change(without, lambda rig: tr("{name} is not tracked any more.", name=name))
 
     def _change(self, change: Callable[[Rig], Rig], words: Callable[[Rig], str]) -> None:
-        def work(client: Asker) -> Rig:
+        def work(client: CommandClient) -> Rig:
             answer = client.command("rig")
             rig = change(parse_rig(msgspec.json.encode(answer["document"]), "the engine's rig"))
             client.command("set_rig", document=msgspec.to_builtins(rig))

@@ -88,7 +88,7 @@ def words_of(arguments: list[str], path: Path | str, folder: Path) -> list[str]:
     return [word.replace("FILE", str(path)).replace("FOLDER", str(folder)) for word in arguments]
 
 
-def refused(arguments: list[str], path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def assert_refused(arguments: list[str], path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     entries = sorted(folder.iterdir())
     code = main(words_of(arguments, path, folder))
     said = capsys.readouterr().err
@@ -104,7 +104,7 @@ def test_no_content_is_more_than_a_sentence(command: str, content: str, tmp_path
                                             capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / f"{content}.json"
     path.write_bytes(CONTENTS[content])
-    refused(READERS[command], path, tmp_path, capsys)
+    assert_refused(READERS[command], path, tmp_path, capsys)
 
 
 @pytest.mark.parametrize("command", READERS)
@@ -112,7 +112,7 @@ def test_pipes_and_folders_are_not_read(command: str, tmp_path: Path, capsys: py
     (tmp_path / "folder.json").mkdir()
     os.mkfifo(tmp_path / "pipe.json")
     for name in ("pipe.json", "folder.json"):
-        refused(READERS[command], tmp_path / name, tmp_path, capsys)
+        assert_refused(READERS[command], tmp_path / name, tmp_path, capsys)
 
 
 LINES = TABLE_LINES_MAX + 1
@@ -128,7 +128,7 @@ MUCH = {"picture": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">IIBBBBB", 30
 def test_no_file_is_too_much(command: str, content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / f"{content}.json"
     path.write_bytes(MUCH[content])
-    refused(READERS[command], path, tmp_path, capsys)
+    assert_refused(READERS[command], path, tmp_path, capsys)
 
 
 @pytest.mark.parametrize("name", ["a" * 300, "b" * 5000, "c\x1b[31m\x07.json", "d\udcff"],
@@ -233,7 +233,7 @@ def test_pipes_and_folders_are_not_replaced(command: str, tmp_path: Path, capsys
     os.mkfifo(tmp_path / "pipe.pdf")
     for name in ("pipe.pdf", "folder.pdf"):
         mode = (tmp_path / name).lstat().st_mode
-        refused(WRITERS[command], tmp_path / name, tmp_path, capsys)
+        assert_refused(WRITERS[command], tmp_path / name, tmp_path, capsys)
         assert (tmp_path / name).lstat().st_mode == mode
 
 

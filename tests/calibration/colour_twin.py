@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from rhot_app.calibration.colour.colours import ColourReport, solve_colours
+from rhot_app.calibration.colour.colours import ColourResult, solve_colours
 from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.simulator.film.scene_objects import SceneObject
 from rhot_app.simulator.film.shot import make_renderer, make_shot
@@ -84,7 +84,7 @@ class HandScene:
                         (float(palm[0]), float(palm[1])))
 
 
-def calibrate(scene: HandScene, times_s: np.ndarray, kelvin: float = LEARNT_KELVIN, half: int = 4) -> ColourReport:
+def calibrate(scene: HandScene, times_s: np.ndarray, kelvin: float = LEARNT_KELVIN, half: int = 4) -> ColourResult:
     """Learn the colours as a person would: a box on every marker, one on the palm, then the hand moves."""
     first, *others = scene.frames(times_s, kelvin)
     collector = ColourSamples()

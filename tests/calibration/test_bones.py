@@ -16,7 +16,7 @@ from rhot_app.__main__ import main
 from rhot_app.calibration.hand import fit as hand_fit
 from rhot_app.calibration.hand.bones import enter_bones, solve_bones
 from rhot_app.calibration.hand.bones_judgement import drift_findings
-from rhot_app.calibration.hand.bones_report import BonesReport, Known
+from rhot_app.calibration.hand.bones_result import BonesResult, Known
 from rhot_app.calibration.hand.marker_places import MarkerTracks, tracks_of
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy, load_hand
@@ -28,7 +28,7 @@ CAPTURED = Sloppiness(noise_m=0.1e-3)
 """As motion capture sees markers."""
 
 
-def lengths_mm(report: BonesReport) -> np.ndarray:
+def lengths_mm(report: BonesResult) -> np.ndarray:
     return np.array([bone.length_mm for bone in report.bones]).reshape(5, 3)
 
 
@@ -66,11 +66,11 @@ def few_instants() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def rich_report(rich: MarkerTracks) -> BonesReport:
+def rich_report(rich: MarkerTracks) -> BonesResult:
     return solve_bones(rich, base_hand("left"))
 
 
-def test_a_marker_on_every_bone_shows_every_bone_of_a_left_hand(hand: HandAnatomy, rich_report: BonesReport) -> None:
+def test_a_marker_on_every_bone_shows_every_bone_of_a_left_hand(hand: HandAnatomy, rich_report: BonesResult) -> None:
     errors = lengths_mm(rich_report) - bones_mm(hand)
     assert np.abs(errors).max() < 2.0
     assert np.abs(errors[:, :2]).max() < 1.0
@@ -79,7 +79,7 @@ def test_a_marker_on_every_bone_shows_every_bone_of_a_left_hand(hand: HandAnatom
     assert all(bone.known is Known.OBSERVED for bone in inner)
 
 
-def test_the_truth_lies_within_what_is_stated(hand: HandAnatomy, rich_report: BonesReport) -> None:
+def test_the_truth_lies_within_what_is_stated(hand: HandAnatomy, rich_report: BonesResult) -> None:
     stated = np.array([bone.std_mm for bone in rich_report.bones]).reshape(5, 3)
     off = np.abs(lengths_mm(rich_report) - bones_mm(hand)) / stated
     assert (off < 1.96).sum() >= 13 and off.max() < 3.5
@@ -141,7 +141,7 @@ def test_a_few_seconds_are_too_short() -> None:
         solve_bones(record(person(3), RICH, 3, seconds=1.0).within(5.0, 6.0), base_hand())
 
 
-def test_what_is_wrong_with_a_recording_is_named(rich_report: BonesReport) -> None:
+def test_what_is_wrong_with_a_recording_is_named(rich_report: BonesResult) -> None:
     assert rich_report.verdict.codes <= {"not_observed"}
     somebody = record(person(3), RICH, 3, seconds=22.0, rate_hz=20.0, sloppiness=CAPTURED)
     at, half = somebody.positions, len(somebody.times_s) // 2

@@ -7,7 +7,7 @@ import pytest
 from colour_scenes import PAINTS, box, picture
 
 from rhot_app.calibration.colour.colours import solve_colours
-from rhot_app.calibration.colour.illuminant import DriftReport, IlluminantDrift
+from rhot_app.calibration.colour.illuminant import DriftResult, IlluminantDrift
 from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.calibration.verdict import Grade
 from rhot_node.detect.fast import FastDetector
@@ -23,7 +23,7 @@ def learnt() -> MarkerSet:
     return solve_colours(collector.samples, collector.views).markers
 
 
-def watch(markers: MarkerSet, frames: int = 6, **light) -> DriftReport:
+def watch(markers: MarkerSet, frames: int = 6, **light) -> DriftResult:
     drift = IlluminantDrift(markers)
     for seed in range(frames):
         drift.update(picture(seed=seed, **light))

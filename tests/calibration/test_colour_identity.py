@@ -7,7 +7,7 @@ import pytest
 from colour_scenes import PAINTS, box, picture, place
 from marker_rendering import Rgb
 
-from rhot_app.calibration.colour.colours import ColourReport, solve_colours
+from rhot_app.calibration.colour.colours import ColourResult, solve_colours
 from rhot_app.calibration.colour.gathering import ColourGathering
 from rhot_app.calibration.colour.identity import Identity, colours_taken, has_hue_of_skin, identify, skin_shown
 from rhot_app.calibration.verdict import Grade
@@ -53,7 +53,7 @@ def identity(gathering: ColourGathering, *, rig: MarkerSet | None = None) -> Ide
     return identify(gathering.samples, gathering.views, models, (gathering.earlier, before))
 
 
-def solved(gathering: ColourGathering, **options) -> ColourReport:
+def solved(gathering: ColourGathering, **options) -> ColourResult:
     return solve_colours(gathering.samples, gathering.views, before=gathering.earlier, **options)
 
 

@@ -9,7 +9,7 @@ import pytest
 from colour_twin import HandScene, calibrate, repainted, tally
 
 from rhot_app.calibration.check.camera_advice import FlickerWatch
-from rhot_app.calibration.colour.colours import ColourReport
+from rhot_app.calibration.colour.colours import ColourResult
 from rhot_app.calibration.verdict import Grade
 from rhot_app.simulator.render.body import SKIN_RGB
 from rhot_app.simulator.render.camera_controls import Lamp
@@ -22,7 +22,7 @@ OTHER_S = np.array([3.1, 4.6])
 MARKERS = load_markers(resource_path("markers", "rhot6.json"))
 
 
-def warned(report: ColourReport, name: str) -> bool:
+def warned(report: ColourResult, name: str) -> bool:
     return any(finding.grade is not Grade.GOOD and name in finding.figure for finding in report.verdict.findings)
 
 

@@ -12,7 +12,7 @@ from colour_scenes import PAINTS, RADIUS, SKIN, WOOD, box, picture, place
 from marker_rendering import Rgb
 from patience import quickest
 
-from rhot_app.calibration.colour.colours import NO_COLOURS, ColourReport, solve_colours
+from rhot_app.calibration.colour.colours import NO_COLOURS, ColourResult, solve_colours
 from rhot_app.calibration.colour.illuminant import LAMPS
 from rhot_app.calibration.colour.samples import ColourSamples
 from rhot_app.calibration.colour.surroundings import hue_histogram
@@ -31,7 +31,7 @@ from rhot_node.markers import load_markers
 RHOT6 = load_markers(resource_path("markers", "rhot6.json"))
 
 
-def calibrate(image: YuvImage, names: tuple[str, ...] = tuple(PAINTS), skin: bool = False, **given) -> ColourReport:
+def calibrate(image: YuvImage, names: tuple[str, ...] = tuple(PAINTS), skin: bool = False, **given) -> ColourResult:
     collector = ColourSamples()
     for name in names:
         collector.add(name, image, box(name))
@@ -41,7 +41,7 @@ def calibrate(image: YuvImage, names: tuple[str, ...] = tuple(PAINTS), skin: boo
                          **given)
 
 
-def misplaced(report: ColourReport, image: YuvImage, shift: tuple[float, float] = (0.0, 0.0)) -> list[str]:
+def misplaced(report: ColourResult, image: YuvImage, shift: tuple[float, float] = (0.0, 0.0)) -> list[str]:
     wrong = []
     for name, seen in zip(report.names, FastDetector(report.markers).detect(image), strict=False):
         x, y = place(name, shift)
@@ -51,11 +51,11 @@ def misplaced(report: ColourReport, image: YuvImage, shift: tuple[float, float] 
 
 
 @pytest.fixture(scope="module")
-def six() -> ColourReport:
+def six() -> ColourResult:
     return calibrate(picture(), skin=True)
 
 
-def test_six_paints_are_learnt_named_and_told_apart(six: ColourReport) -> None:
+def test_six_paints_are_learnt_named_and_told_apart(six: ColourResult) -> None:
     assert six.verdict.acceptable
     assert not {"overlap", "same-colour", "skin", "room", "fails", "lamp"} & six.verdict.codes
     assert [marker.role for marker in six.markers.markers] == [
@@ -67,21 +67,21 @@ def test_six_paints_are_learnt_named_and_told_apart(six: ColourReport) -> None:
         assert abs(math.degrees(away)) < 3.0
 
 
-def test_paint_before_a_wall_of_its_colour_is_said(six: ColourReport) -> None:
+def test_paint_before_a_wall_of_its_colour_is_said(six: ColourResult) -> None:
     blue = {**PAINTS, "thumb": (60, 90, 160)}
     assert "runs-on" in calibrate(picture(blue, background=(70, 100, 165)), names=("thumb",)).verdict.codes
     assert "runs-on" not in six.verdict.codes
 
 
 @pytest.mark.parametrize("lamp", [lamp for lamp in LAMPS if lamp.temperature_shift in (-0.54, 0.54, 0.0)], ids=str)
-def test_no_marker_is_lost_by_another_lamp(six: ColourReport, lamp) -> None:
+def test_no_marker_is_lost_by_another_lamp(six: ColourResult, lamp) -> None:
     shift = (11.0, 23.0)
     shown = picture(shift=shift, light=lamp.brightness ** (1 / 2.2), gains=tuple(gains_of(lamp.temperature_shift)),
                     seed=7)
     assert misplaced(six, shown, shift) == []
 
 
-def test_the_thesis_detector_gets_bounds_of_its_own(six: ColourReport) -> None:
+def test_the_thesis_detector_gets_bounds_of_its_own(six: ColourResult) -> None:
     for name, seen in zip(six.names, ReferenceDetector(six.markers).detect(picture(seed=3)), strict=True):
         assert math.hypot(seen.x - place(name)[0], seen.y - place(name)[1]) < 0.35 * RADIUS, name
 
@@ -175,7 +175,7 @@ def test_a_dull_thing_of_the_same_hue_is_kept_out_by_the_magnitude() -> None:
     assert misplaced(report, picture(clutter=[(291.0, 30.0, 24.0, dull)], background=(60, 62, 66), seed=4)) == []
 
 
-def test_free_paints_are_far_from_all_that_are_worn(six: ColourReport) -> None:
+def test_free_paints_are_far_from_all_that_are_worn(six: ColourResult) -> None:
     three = calibrate(picture({name: PAINTS[name] for name in ("thumb", "middle", "index")}, background=(90, 92, 95)),
                       ("thumb", "middle", "index"))
     assert not {"magenta", "green", "yellow", "orange", "red"} & set(three.free)
@@ -221,7 +221,7 @@ def test_mask_and_histogram_of_a_live_picture_take_little_of_a_tenth_of_a_second
     assert quickest(look, 0.04, 12, time.process_time) < 0.04
 
 
-def test_wood_and_skin_are_no_markers_colour(six: ColourReport) -> None:
+def test_wood_and_skin_are_no_markers_colour(six: ColourResult) -> None:
     gate = ColourGate(six.markers)
     bare = picture({}, background=WOOD)
     finger = picture({"thumb": SKIN}, background=WOOD)

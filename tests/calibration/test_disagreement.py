@@ -10,7 +10,7 @@ from stereo_twin import stereo_twin
 
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.bundle.robust_error import in_words, what_is_reported
-from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
+from rhot_app.calibration.lens.intrinsics import IntrinsicsResult, solve
 from rhot_app.calibration.stereo.calibrate import calibrate
 from rhot_app.geometry.camera import PLAIN
 
@@ -30,7 +30,7 @@ def bending(seed: int) -> list[BoardView]:
 
 
 @pytest.fixture(scope="module")
-def bent() -> list[IntrinsicsReport]:
+def bent() -> list[IntrinsicsResult]:
     return [solve(bending(seed), BOARD) for seed in range(3)]
 
 
@@ -41,13 +41,13 @@ def test_independent_errors_are_no_disagreement() -> None:
     assert figures is not None and figures.error_inflation < 1.5
 
 
-def test_a_board_that_bends_in_every_picture_is_noticed(bent: list[IntrinsicsReport]) -> None:
+def test_a_board_that_bends_in_every_picture_is_noticed(bent: list[IntrinsicsResult]) -> None:
     assert min(report.error_inflation for report in bent) > 1.5
     assert "bends from picture to picture" in in_words(bent[0].error_inflation)
     assert "apart" in what_is_reported(bent[0].error_inflation) and "apart" not in what_is_reported(1.1)
 
 
-def test_what_is_stated_then_holds(bent: list[IntrinsicsReport]) -> None:
+def test_what_is_stated_then_holds(bent: list[IntrinsicsResult]) -> None:
     off = np.concatenate([(report.lens - LENS)[:PLAIN] / report.std[:PLAIN] for report in bent])
     by_corners = np.concatenate([each * report.error_inflation
                                  for each, report in zip(off.reshape(-1, PLAIN), bent, strict=True)])

@@ -10,7 +10,7 @@ from board_rendering import LENS, corners_px, pose
 from intrinsics_twin import BOARD, seen, twin_views
 
 from rhot_app.calibration.board.boards import CharucoBoard
-from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
+from rhot_app.calibration.lens.intrinsics import IntrinsicsResult, solve
 from rhot_app.calibration.lens.intrinsics_checks import expected_errors
 from rhot_app.calibration.lens.misfit import residual_field
 from rhot_app.calibration.verdict import Grade
@@ -21,7 +21,7 @@ NOISE_PX = 0.05
 
 
 @pytest.fixture(scope="module")
-def noisy() -> IntrinsicsReport:
+def noisy() -> IntrinsicsResult:
     """Fifteen views with noise."""
     return solve(twin_views(np.random.default_rng(5), noise_px=NOISE_PX), BOARD)
 
@@ -34,7 +34,7 @@ def test_exact_corners_give_the_lens_back() -> None:
     assert report.rms_px < 1e-6 and report.verdict.grade is Grade.GOOD
 
 
-def test_noise_is_estimated_and_the_truth_lies_in_the_intervals(noisy: IntrinsicsReport) -> None:
+def test_noise_is_estimated_and_the_truth_lies_in_the_intervals(noisy: IntrinsicsResult) -> None:
     assert noisy.rms_px == pytest.approx(NOISE_PX * np.sqrt(2), rel=0.1)
     assert np.all(np.abs(noisy.lens - LENS) <= 3.5 * noisy.std)
     assert 0.05 < noisy.std[0] < 1.0
@@ -42,7 +42,7 @@ def test_noise_is_estimated_and_the_truth_lies_in_the_intervals(noisy: Intrinsic
     assert noisy.board_errors is None, "a perfect board was bent"
 
 
-def test_the_report_holds_every_corner(noisy: IntrinsicsReport) -> None:
+def test_the_report_holds_every_corner(noisy: IntrinsicsResult) -> None:
     assert len(noisy.views) == 15 and noisy.views[0].source == "view01" and noisy.views[0].corners == 54
     assert noisy.field.residuals.shape == (15 * 54, 2)
     assert noisy.field.count.sum() == 15 * 54
@@ -152,7 +152,7 @@ def test_work_can_be_watched_and_stopped() -> None:
         solve(twin_views(np.random.default_rng(1), count=6), BOARD, progress=stop)
 
 
-def test_certainty_in_millimetres_is_what_lenses_from_the_covariance_do(noisy: IntrinsicsReport) -> None:
+def test_certainty_in_millimetres_is_what_lenses_from_the_covariance_do(noisy: IntrinsicsResult) -> None:
     """A wrong principal point is nearly a turn of the camera; a wrong focal length is felt at the rim."""
     tenth = np.zeros((12, 12))
     tenth[2, 2] = 4.0

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from stereo_pictures import BOARD, NUMBERS, needs_pictures, views_of
 
-from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, solve
+from rhot_app.calibration.lens.intrinsics import IntrinsicsResult, solve
 from rhot_app.geometry.camera import PLAIN
 
 pytestmark = needs_pictures
 
 
 @pytest.fixture(scope="module")
-def left() -> IntrinsicsReport:
+def left() -> IntrinsicsResult:
     """The left camera, 13 views (all but 10), square pixels."""
     views = [view for number, view in zip(NUMBERS, views_of("left"), strict=True) if number != 10]
     return solve([view for view in views if view is not None], BOARD, square_pixels=True)
 
 
-def test_the_left_camera_is_as_published(left: IntrinsicsReport) -> None:
+def test_the_left_camera_is_as_published(left: IntrinsicsResult) -> None:
     fx, fy, cx, cy = left.lens[:4]
     assert fx == fy == pytest.approx(535.9, abs=2.0)
     assert cx == pytest.approx(342.3, abs=3.0)
@@ -28,7 +28,7 @@ def test_the_left_camera_is_as_published(left: IntrinsicsReport) -> None:
     assert len(left.views) == 13 and not left.dropped
 
 
-def test_it_is_better_than_published(left: IntrinsicsReport) -> None:
+def test_it_is_better_than_published(left: IntrinsicsResult) -> None:
     assert left.rms_px < 0.09
     assert left.std[0] < 0.6 and left.std[2:4].max() < 0.7
     assert left.verdict.acceptable

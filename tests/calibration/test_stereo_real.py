@@ -12,7 +12,7 @@ from stereo_pictures import BOARD, needs_pictures, rough, shared, views_of
 from rhot_app.calibration.bundle.model import BundleState
 from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate
-from rhot_app.calibration.stereo.report import StereoFigures, StereoReport
+from rhot_app.calibration.stereo.result import StereoFigures, StereoResult
 from rhot_app.calibration.stereo.ruler import RulerReading
 from rhot_app.calibration.verdict import Grade
 from rhot_app.errors import CalibrationError
@@ -23,24 +23,24 @@ FEW = 8  # shots, where the lie is what matters
 UNPROVEN = {"lengths_unproven"}  # nothing else is found where no second length is given
 
 
-def figures(report: StereoReport) -> StereoFigures:
+def figures(report: StereoResult) -> StereoFigures:
     assert report.figures is not None
     return report.figures
 
 
 @pytest.fixture(scope="module")
-def truth() -> StereoReport:
+def truth() -> StereoResult:
     """All 14 pairs as they were taken."""
     return calibrate(shared(views_of("left"), views_of("right")), rough())
 
 
 @pytest.fixture(scope="module")
-def known(truth: StereoReport) -> list[LensStart]:
+def known(truth: StereoResult) -> list[LensStart]:
     """The lenses as files give them, with their standard deviations."""
     return [LensStart(camera.lens, camera.size, camera.lens_std) for camera in figures(truth).cameras]
 
 
-def test_the_published_geometry_comes_out(truth: StereoReport) -> None:
+def test_the_published_geometry_comes_out(truth: StereoResult) -> None:
     found = figures(truth)
     (pair,) = found.pairs
     assert truth.verdict.codes == UNPROVEN
@@ -55,7 +55,7 @@ def test_the_published_geometry_comes_out(truth: StereoReport) -> None:
     assert np.all(pair.translation_std_m < 5e-4)
 
 
-def test_given_lenses_give_the_same_geometry(known: list[LensStart], truth: StereoReport) -> None:
+def test_given_lenses_give_the_same_geometry(known: list[LensStart], truth: StereoResult) -> None:
     views = shared(views_of("left"), views_of("right"))
     for refine in (False, True):
         found = calibrate(views, known, refine=refine)
@@ -148,7 +148,7 @@ def test_a_scrambled_list_is_put_in_order_in_words() -> None:
     assert f"01 of left with {where:02d} of right" in report.verdict.findings[0].figure
 
 
-def said(square_m: float) -> StereoReport:
+def said(square_m: float) -> StereoResult:
     """With squares said to be `square_m`, a ruler of 240 mm seen in pair 3, and the baseline by hand."""
     left, right = views_of("left"), views_of("right")
     views = replace(shared(left, right, most=FEW), board=replace(BOARD, square_m=square_m))
@@ -191,7 +191,7 @@ def test_pictures_of_another_size_are_refused(known: list[LensStart]) -> None:
         calibrate(shared(views_of("left"), views_of("right")), small)
 
 
-def test_scale_is_the_boards_alone(truth: StereoReport) -> None:
+def test_scale_is_the_boards_alone(truth: StereoResult) -> None:
     state: BundleState = figures(truth).state
     views = replace(shared(views_of("left"), views_of("right")), board=replace(BOARD, square_m=0.060))
     twice = figures(calibrate(views, rough())).state

@@ -16,7 +16,7 @@ from rhot_app.calibration.lens.fit import LensStart
 from rhot_app.calibration.stereo.adjust import StereoSolution, view_rms
 from rhot_app.calibration.stereo.calibrate import calibrate, solve
 from rhot_app.calibration.stereo.points import locate
-from rhot_app.calibration.stereo.report import StereoFigures, StereoReport
+from rhot_app.calibration.stereo.result import StereoFigures, StereoResult
 from rhot_app.calibration.stereo.ruler import RulerReading, read_ruler
 from rhot_app.errors import CalibrationError
 from rhot_app.estimation.se3 import exp_so3
@@ -24,7 +24,7 @@ from rhot_app.geometry.camera import CameraModel, full_lens, intrinsics_row
 from rhot_app.geometry.transforms import inverse, rigid
 
 
-def figures(report: StereoReport) -> StereoFigures:
+def figures(report: StereoResult) -> StereoFigures:
     assert report.figures is not None
     return report.figures
 

@@ -17,7 +17,7 @@ from rhot_app.calibration.board.shared_views import SharedViews
 from rhot_app.calibration.check.checks import check_cameras
 from rhot_app.calibration.kinds.lens import report as said_of
 from rhot_app.calibration.lens.fit import LensStart, find_lens
-from rhot_app.calibration.lens.intrinsics import IntrinsicsReport, load_intrinsics, save_intrinsics, solve
+from rhot_app.calibration.lens.intrinsics import IntrinsicsResult, load_intrinsics, save_intrinsics, solve
 from rhot_app.calibration.stereo.calibrate import KnownLengths, calibrate, calibrated_rig, lens_of
 from rhot_app.calibration.verdict import Grade, Verdict
 from rhot_app.errors import RigError
@@ -28,7 +28,7 @@ from rhot_node.files import resource_path
 CASE = Path(__file__).resolve().parents[3] / "shared" / "cases" / "fisheye"
 
 
-def left_of(views: SharedViews) -> IntrinsicsReport:
+def left_of(views: SharedViews) -> IntrinsicsResult:
     return solve([view for view in views.of_camera(0) if view is not None], BOARD)
 
 
@@ -39,11 +39,11 @@ def wide() -> SharedViews:
 
 
 @pytest.fixture(scope="module")
-def report(wide: SharedViews) -> IntrinsicsReport:
+def report(wide: SharedViews) -> IntrinsicsResult:
     return left_of(wide)
 
 
-def test_a_lens_of_120_degrees_is_found(report: IntrinsicsReport) -> None:
+def test_a_lens_of_120_degrees_is_found(report: IntrinsicsResult) -> None:
     assert report.lens[0] == pytest.approx(focal_px(120.0), rel=0.003)
     assert report.lens[2:4] == pytest.approx([319.5, 239.5], abs=0.5)
     assert len(report.intrinsics.distortion) == 8 and report.verdict.grade is Grade.GOOD, report.verdict
@@ -79,7 +79,7 @@ def test_two_cameras_of_120_degrees_are_put_together(wide: SharedViews, tmp_path
     assert all(finding.grade is not Grade.POOR and finding.code != "field_of_view" for finding in check_cameras(again))
 
 
-def test_a_wide_lens_is_kept_in_a_file(report: IntrinsicsReport, wide: SharedViews, tmp_path: Path) -> None:
+def test_a_wide_lens_is_kept_in_a_file(report: IntrinsicsResult, wide: SharedViews, tmp_path: Path) -> None:
     save_intrinsics(tmp_path / "left.json", report)
     written = load_intrinsics(tmp_path / "left.json")
     assert written.intrinsics == report.intrinsics and {"k3", "k6"} <= set(written.std)
@@ -88,7 +88,7 @@ def test_a_wide_lens_is_kept_in_a_file(report: IntrinsicsReport, wide: SharedVie
     assert free is not None and free.pairs[0].baseline_m == pytest.approx(0.075, abs=5e-4)
 
 
-def text_of(report: IntrinsicsReport) -> str:
+def text_of(report: IntrinsicsResult) -> str:
     return json.dumps([said_of(report, None).to_json(), said_of(report, None).lines()], allow_nan=False)
 
 

@@ -68,6 +68,8 @@ def test_text_datagrams_move_the_markers_and_garbage_between_them_is_counted_and
         before = count_dropped(client)
         send(bench, client, there_m, 2 * len(garbage), garbage)
         wait_until(client, lambda: count_dropped(client) >= before + 2 * len(garbage), PATIENCE_S, "every drop")
+        error_m = np.linalg.norm(send(bench, client, there_m, 5)[-1].marker_raw_positions - there_m, axis=1)
+        assert error_m.max() < 0.003, "garbage moves no marker"
 
 
 @pytest.mark.timeout(TEST_S)

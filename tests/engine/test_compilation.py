@@ -50,7 +50,10 @@ def test_it_is_said_how_long_a_step_has_been_compiled_that_takes_long() -> None:
 
 def test_nothing_is_compiled_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(VARIABLE)
-    compile_part(WINDOW, lambda text, fraction: pytest.fail("for whom?"), command=program("raise SystemExit(1)"))
+    said: list[str] = []
+    started: list[int] = []
+    compile_part(WINDOW, lambda text, fraction: said.append(text), started.append, program(STEPS))
+    assert not said and not started, "for whom?"
 
 
 @pytest.mark.parametrize(("code", "reason"), [("print('rhot: the disk is full'); raise SystemExit(2)", "disk is full"),

@@ -86,6 +86,13 @@ def test_a_planted_circle_is_found() -> None:
     assert imports({"a.b": "from a.b import c"}) == {"a.b": {"a.b"}}
 
 
+def test_a_planted_circle_of_folders_is_found() -> None:
+    modules = {"a.b": {"c.d"}, "c.d": set(), "c.e": {"a.f"}, "a.f": set()}
+    refuse_circles(modules, "modules")
+    with pytest.raises(pytest.fail.Exception, match="folders need each other"):
+        refuse_circles(grouped(modules, lambda module: module.rpartition(".")[0]), "folders")
+
+
 def test_no_folder_of_the_app_needs_one_that_needs_it() -> None:
     app = {module: {one for one in others if one.startswith("rhot_app.")} for module, others in project().items()
            if module.startswith("rhot_app.")}

@@ -29,7 +29,7 @@ SHOWING = {
     "setText", "setToolTip", "setWindowTitle", "setTitle", "setAccessibleName", "setPlaceholderText", "setLabelText",
     "setSpecialValueText", "setHorizontalHeaderLabels", "addItem", "addTab", "addRow", "addMenu", "drawText",
     "QLabel", "QAction", "QPushButton", "QCheckBox", "QRadioButton", "QMenu", "QToolBar", "QDockWidget", "Column",
-    "EmptyState"}
+    "EmptyState", "plain_button"}
 """What is given to these is read, a single word as well."""
 
 INTERNAL = {
@@ -43,7 +43,6 @@ NO_WORDS = {
     "rhot_app/ui/demo_command.py": "the command line is English",
     "rhot_app/ui/handfit/fit_command.py": "the command line is English",
     "rhot_app/ui/scene/mesh_item.py": "shaders",
-    "rhot_app/ui/common/theme.py": "a style sheet",
 }
 NOT_TRANSLATED = {
     "names in the settings and the session": (

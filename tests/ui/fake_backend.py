@@ -13,7 +13,7 @@ from fake_engine import FakeClient, FakeEngine
 from rhot_app.errors import CalibrationError, RhotError, RigError, SimulatorError
 from rhot_app.progress import Progress
 from rhot_app.simulator.scene.scene_file import SceneFields, write_scene
-from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
+from rhot_app.ui.backend.contract import Opened, TwinChoice, TwinPace
 from rhot_app.ui.backend.solver import Solver, StoppedError
 
 
@@ -75,30 +75,30 @@ class FakeBackend:
     def client(self) -> FakeClient:
         return FakeClient(self.engine)
 
-    def asker(self) -> FakeClient:
+    def command_client(self) -> FakeClient:
         return FakeClient(self.engine)
 
     def found(self) -> bool:
         self.looks += 1
         return self.already_running
 
-    def attach(self, report: Report) -> Opened:
+    def attach(self, progress: Progress) -> Opened:
         self.calls.append("attach")
         return self._opened("", simulated=False)
 
-    def open_rig(self, path: Path, report: Report) -> Opened:
+    def open_rig(self, path: Path, progress: Progress) -> Opened:
         self.calls.append(f"open {path.name}")
-        self._work(report)
+        self._work(progress)
         return self._opened(str(path), simulated=False)
 
-    def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
+    def open_twin(self, choice: TwinChoice, progress: Progress) -> Opened:
         self.calls.append(f"twin {choice.motion if choice.scene is None else choice.scene.name}")
-        self._work(report)
+        self._work(progress)
         return self._opened("", simulated=True)
 
-    def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
+    def restart_engine(self, path: str, start: bool, progress: Progress) -> Opened:
         self.calls.append(f"restart start={start}")
-        self._work(report)
+        self._work(progress)
         self.engine.dead = False
         self.engine.running = start
         return self._opened(path, simulated=True)
@@ -140,12 +140,12 @@ class FakeBackend:
         self.calls.append("close")
         return "" if self.ours else "The engine was not started by this app and goes on running."
 
-    def _work(self, report: Report) -> None:
-        report("Starting the engine …", 0.4)
+    def _work(self, progress: Progress) -> None:
+        progress("Starting the engine …", 0.4)
         self.gate.wait(10.0)
         if self.refuse:
             raise RigError(self.refuse)
-        report("Asking the engine for its rig …", 0.9)
+        progress("Asking the engine for its rig …", 0.9)
 
     def _opened(self, path: str, *, simulated: bool) -> Opened:
         self.engine.rig_path = path

@@ -59,10 +59,10 @@ class LendingBackend(RigBackend):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.missed: set[Borrowed] = set()
-        self.rig_asker.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
+        self.rig_client.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
 
-    def asker(self) -> Any:
-        return Borrowed(super().asker(), self.missed)
+    def command_client(self) -> Any:
+        return Borrowed(super().command_client(), self.missed)
 
     def client(self) -> Any:
         return Borrowed(super().client(), self.missed)

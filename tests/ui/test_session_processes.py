@@ -85,7 +85,7 @@ def test_an_engine_that_records_is_not_replaced(session, rig_path, tmp_path):
 def test_an_engine_that_hangs_is_replaced_and_its_recording_continued(session, rig_path, tmp_path, monkeypatch):
     session.open_rig(rig_path, quiet)
     hung = running_engine(session.directory)
-    with session.asker() as client:
+    with session.command_client() as client:
         client.command("record", path=str(tmp_path / "r.rhotlog"))
         eventually(lambda: "r.rhotlog" in (session.directory / "engine.json").read_text())
         os.kill(hung, signal.SIGSTOP)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.check.exposure import (
-    ExposureReport,
+    ExposureResult,
     Mask,
     WhiteBalance,
     balance_on_grey,
@@ -29,8 +29,8 @@ Array = NDArray[np.float64]
 class CameraAdvice:
     """`flicker`: None until enough frames are seen, `white`: None without a grey patch."""
 
-    exposure: ExposureReport
-    flicker: FlickerReport | None
+    exposure: ExposureResult
+    flicker: FlickerResult | None
     white: WhiteBalance | None
     verdict: Verdict
 
@@ -87,7 +87,7 @@ ROW_TIMES_US = np.arange(0.0, 81.0, 2.0)  # that are tried where the camera does
 
 
 @dataclass(frozen=True, slots=True)
-class FlickerReport:
+class FlickerResult:
     """`mains_hz`: of the lamp, None when no flicker is seen; `depth`: amplitude as a share of the mean brightness.
 
     `depths` by mains frequency, NaN where frames come in step with it, so that a standing pattern would not be seen.
@@ -122,7 +122,7 @@ class FlickerWatch:
         """Whether there are enough frames to tell."""
         return len(self._rows) >= FRAMES_LEAST
 
-    def report(self, row_time_s: float | None, exposure_s: float, fps: float) -> FlickerReport:
+    def report(self, row_time_s: float | None, exposure_s: float, fps: float) -> FlickerResult:
         """What `measure_flicker` says of the frames so far; `row_time_s` as for one row of the picture."""
         return measure_flicker(self._rows, self._times, row_time_s, exposure_s, fps)
 
@@ -133,7 +133,7 @@ def row_means(image: YuvImage) -> Array:
 
 
 def measure_flicker(rows: Sequence[Array], times_s: Sequence[float], row_time_s: float | None, exposure_s: float,
-                    fps: float) -> FlickerReport:
+                    fps: float) -> FlickerResult:
     """Flicker in frames with mean row brightness `rows` (F, H), row 0 of which was mid-exposed at `times_s` (F,).
 
     `row_time_s`: from row to row; None where the camera does not tell it (0: all rows at once). Raises CalibrationError
@@ -154,7 +154,7 @@ def measure_flicker(rows: Sequence[Array], times_s: Sequence[float], row_time_s:
     depth = seen.get(strongest, 0.0) if strongest else 0.0
     bands = 2.0 * strongest * places[strongest] * len(rows[0]) if strongest else 0.0
     exposures = _steady_exposures(strongest, fps) if strongest else ()
-    return FlickerReport(strongest, depth, depths, bands, exposures,
+    return FlickerResult(strongest, depth, depths, bands, exposures,
                          tuple(_findings(strongest, depth, depths, bands, exposures, exposure_s)))
 
 

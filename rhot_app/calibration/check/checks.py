@@ -203,10 +203,10 @@ def _model(node: RigNode) -> CameraModel:
     return CameraModel.from_rig(node.intrinsics, node.pose)
 
 
-# -- the report of ``rhot check`` --------------------------------------------------------------------------------------
+# -- the result of ``rhot check`` --------------------------------------------------------------------------------------
 
 @dataclass(frozen=True, slots=True)
-class RigReport:
+class RigCheck:
     """What a rig file amounts to; lenses and pairs are empty where distance comes from disparity alone."""
 
     lenses: tuple[LensFigures, ...]
@@ -214,7 +214,7 @@ class RigReport:
     verdict: Verdict
 
 
-def check_rig(rig: Rig) -> RigReport:
+def check_rig(rig: Rig) -> RigCheck:
     """Check a whole rig."""
     calibrated = rig.depth.mode == "stereo"
     lenses = tuple(lens_figures(node) for node in rig.nodes) if calibrated else ()
@@ -224,7 +224,7 @@ def check_rig(rig: Rig) -> RigReport:
     if len(rig.nodes) < 2:
         findings.append(Finding("one_camera", Grade.FAIR, "The rig has one camera.", "Depth needs two.",
                                 "Add a second node."))
-    return RigReport(lenses, pairs, judge(_summary(rig, findings), findings))
+    return RigCheck(lenses, pairs, judge(_summary(rig, findings), findings))
 
 
 def check_cameras(rig: Rig) -> list[Finding]:

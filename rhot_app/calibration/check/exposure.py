@@ -67,7 +67,7 @@ class Range:
 
 
 @dataclass(frozen=True, slots=True)
-class ExposureReport:
+class ExposureResult:
     """The `picture` as a whole, its `markers` by name, and the `factor` on the exposure that would suit."""
 
     picture: Exposed
@@ -83,7 +83,7 @@ class ExposureReport:
 
 
 def measure_exposure(image: YuvImage, markers: Mapping[str, Mask] | None = None,
-                     settings: CameraSettings | None = None) -> ExposureReport:
+                     settings: CameraSettings | None = None) -> ExposureResult:
     """How a picture is exposed. `markers`: chroma pixels (H/2, W/2) of each, as the detector's `paint_mask` gives them.
 
     `settings`: what the camera is set to now, so that the advice can name values.
@@ -95,7 +95,7 @@ def measure_exposure(image: YuvImage, markers: Mapping[str, Mask] | None = None,
     factor = _factor(picture, inside)
     advice = _Remedies(settings, factor, spans.cast)
     findings = (*_marker_findings(inside, advice), *_picture_findings(picture, spans, bool(inside), advice))
-    return ExposureReport(picture, spans, inside, factor, findings)
+    return ExposureResult(picture, spans, inside, factor, findings)
 
 
 def _range(colours: Colours, luma: NDArray[np.uint8]) -> Range:

@@ -13,7 +13,7 @@ from rhot_app.calibration.colour.identity import free_paints, identify
 from rhot_app.calibration.colour.model import Obstacles, range_of_samples, solve_models
 from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.separability import Separability, judge_colours
-from rhot_app.calibration.colour.surroundings import SurroundingsReport, surrounding_colours, survey_surroundings
+from rhot_app.calibration.colour.surroundings import SurroundingsResult, surrounding_colours, survey_surroundings
 from rhot_app.calibration.colour.verdict import Rehearsal, judge_report, rehearse
 from rhot_app.calibration.verdict import Verdict
 from rhot_app.errors import CalibrationError
@@ -28,7 +28,7 @@ ROLES = {**{role.removesuffix("_tip"): role for role in TIP_ROLES}, "pinky": "li
 
 
 @dataclass(frozen=True, slots=True)
-class ColourReport:
+class ColourResult:
     """What a calibration of colours found.
 
     `markers`: the set to be used, base markers without samples left as they were. `names`: the markers with samples, in
@@ -40,7 +40,7 @@ class ColourReport:
     names: tuple[str, ...]
     samples: tuple[PaintSamples, ...]
     separability: Separability
-    room: SurroundingsReport
+    room: SurroundingsResult
     rehearsal: Rehearsal
     free: tuple[str, ...]
     verdict: Verdict
@@ -49,7 +49,7 @@ class ColourReport:
 def solve_colours(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture], *, skin: Colours = NO_COLOURS,
                   base: MarkerSet | None = None, given: Mapping[str, ChromaModel] | None = None,
                   before: Mapping[str, Sequence[ChromaModel]] | None = None,
-                  progress: Progress = silent) -> ColourReport:
+                  progress: Progress = silent) -> ColourResult:
     """Colour models for all sampled markers, and how well they can be told apart from each other, skin and the room.
 
     `views`: pictures in which the markers that they show are marked, as `ColourSamples` keeps them. `skin` (N, 3): Y,
@@ -80,7 +80,7 @@ def solve_colours(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture
     rig = {} if base is None else {marker.id: (marker.chroma,) for marker in base.markers}
     identity = identify(ordered, views, {marker.id: marker.chroma for marker in markers.markers}, (before or {}, rig))
     verdict = judge_report(ordered, markers, separability, room, rehearsal, free, runs_on, identity)
-    return ColourReport(markers, names, tuple(ordered), separability, room, rehearsal, free, verdict)
+    return ColourResult(markers, names, tuple(ordered), separability, room, rehearsal, free, verdict)
 
 
 def _in_order(samples: Sequence[PaintSamples], base: MarkerSet | None) -> list[PaintSamples]:

@@ -36,7 +36,7 @@ def name_of_hue(hue_deg: float) -> str:
 def free_paints(taken_deg: Sequence[float], room_px: NDArray[np.float64]) -> tuple[str, ...]:
     """Paints APART_DEG from all hues that are taken, not in the hues of skin, those that the room has least of first.
 
-    `room_px` (72,) as `surroundings.SurroundingsReport`'s `hue_px`.
+    `room_px` (72,) as `surroundings.SurroundingsResult`'s `hue_px`.
     """
     free = [(name, hue) for name, hue in PAINTS if not SKIN_DEG[0] <= hue <= SKIN_DEG[1]
             and all(_apart(hue, other) >= APART_DEG for other in taken_deg)]

@@ -134,7 +134,7 @@ class MarkerDrift:
 
 
 @dataclass(frozen=True, slots=True)
-class DriftReport:
+class DriftResult:
     """`temperature_shift`: how much warmer the light is (`rhot_node.detect.illuminant`), `light`: factor on it, median
     of the markers.
 
@@ -176,13 +176,13 @@ class IlluminantDrift:
                 self._seen[mark.index].append(colours[mark.index])
         self._warmth.append(self._detector.temperature_shift)
 
-    def report(self) -> DriftReport:
+    def report(self) -> DriftResult:
         """How the light stands now."""
         temperature_shift = float(np.median(self._warmth)) if self._warmth else 0.0
         drifts = tuple(self._drift(index, temperature_shift) for index, observations in enumerate(self._seen)
                        if len(observations) >= OBSERVATIONS_LEAST)
         light = float(np.median([drift.light for drift in drifts])) if drifts else 1.0
-        return DriftReport(temperature_shift, light, drifts, _judge(temperature_shift, light, drifts))
+        return DriftResult(temperature_shift, light, drifts, _judge(temperature_shift, light, drifts))
 
     def _drift(self, index: int, temperature_shift: float) -> MarkerDrift:
         chroma = self._markers.markers[index].chroma
@@ -197,7 +197,7 @@ class IlluminantDrift:
         return MarkerDrift(self._markers.ids[index], hue, max(margin, 0.0), light, float(luma), len(self._seen[index]))
 
 
-def drift_findings(reports: Mapping[str, DriftReport]) -> tuple[Finding, ...]:
+def drift_findings(reports: Mapping[str, DriftResult]) -> tuple[Finding, ...]:
     """What the camera that sees most drift says, by camera; usable at worst: the colours are right for their light."""
     drifted = {camera: report for camera, report in reports.items() if report.verdict.grade is not Grade.GOOD}
     if not drifted:

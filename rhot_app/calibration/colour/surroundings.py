@@ -40,7 +40,7 @@ class Rival:
 
 
 @dataclass(frozen=True, slots=True)
-class SurroundingsReport:
+class SurroundingsResult:
     """`hue_px` (72,): chroma pixels per picture outside all markers by hue, from -180 degrees on in steps of 5.
 
     `rivals`: per marker the worst of all pictures that show it, None when nothing passes.
@@ -60,7 +60,7 @@ class SurroundingColours:
     size: float
 
 
-def survey_surroundings(markers: MarkerSet, names: Sequence[str], views: Sequence[MarkedPicture]) -> SurroundingsReport:
+def survey_surroundings(markers: MarkerSet, names: Sequence[str], views: Sequence[MarkedPicture]) -> SurroundingsResult:
     """Search the pictures outside the markers. `names`: of the markers, in the order of the set."""
     gate = ColourGate(markers)
     histogram = np.zeros(HUE_BINS)
@@ -74,7 +74,7 @@ def survey_surroundings(markers: MarkerSet, names: Sequence[str], views: Sequenc
                 known = rivals[index]
                 if rival is not None and (known is None or rival.merit > known.merit):
                     rivals[index] = rival
-    return SurroundingsReport(histogram, tuple(rivals))
+    return SurroundingsResult(histogram, tuple(rivals))
 
 
 def hue_histogram(image: YuvImage, where: Mask) -> NDArray[np.float64]:

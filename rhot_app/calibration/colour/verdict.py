@@ -16,7 +16,7 @@ from rhot_app.calibration.colour.model import COVERAGE
 from rhot_app.calibration.colour.paint_region import HUE_REACH_DEG, PaintRegion
 from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
 from rhot_app.calibration.colour.separability import SKIN, Separability
-from rhot_app.calibration.colour.surroundings import SurroundingsReport
+from rhot_app.calibration.colour.surroundings import SurroundingsResult
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.progress import Progress, silent
 from rhot_node.detect.fast import FastDetector
@@ -160,7 +160,7 @@ FAIR, GOOD, POOR = Grade.FAIR, Grade.GOOD, Grade.POOR
 
 
 def judge_report(samples: Sequence[PaintSamples], markers: MarkerSet, separability: Separability,
-                 room: SurroundingsReport, rehearsal: Rehearsal, free: Sequence[str], runs_on: set[str],
+                 room: SurroundingsResult, rehearsal: Rehearsal, free: Sequence[str], runs_on: set[str],
                  identity: Identity) -> Verdict:
     """All findings on a calibration, worst first, and a sentence that sums up. `markers`: all of the set."""
     bounds = {marker.id: marker.chroma for marker in markers.markers}
@@ -246,7 +246,7 @@ def _exchanged(identity: Identity) -> Iterator[Finding]:
                       "If the hand does not wear them so, pick these markers again.")
 
 
-def _rivals(samples: Sequence[PaintSamples], room: SurroundingsReport, free: Sequence[str]) -> Iterator[Finding]:
+def _rivals(samples: Sequence[PaintSamples], room: SurroundingsResult, free: Sequence[str]) -> Iterator[Finding]:
     for one, rival in zip(samples, room.rivals, strict=True):
         if rival is None or rival.merit < RIVAL:
             continue
@@ -260,7 +260,7 @@ def _rivals(samples: Sequence[PaintSamples], room: SurroundingsReport, free: Seq
 
 
 def _lamps(samples: Sequence[PaintSamples], rehearsal: Rehearsal, separability: Separability,
-           room: SurroundingsReport) -> Iterator[Finding]:
+           room: SurroundingsResult) -> Iterator[Finding]:
     for one, lost, coverage, rival in zip(samples, rehearsal.lost, separability.coverage, room.rivals, strict=True):
         own = [failure for failure in rehearsal.failures if failure.marker == one.name]
         now = [failure for failure in own if failure.lamp == SAME]

@@ -12,7 +12,7 @@ from rhot_app.options import add_json_argument
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.check.checks import RigReport
+    from rhot_app.calibration.check.checks import RigCheck
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,33 +30,33 @@ def run(args: argparse.Namespace) -> int:
     from rhot_app.calibration.check.camera_calibration import calibration_text
     from rhot_app.calibration.check.checks import check_rig
 
-    report, calibration = check_rig(rig), calibration_text(rig)
-    said = Report(report.verdict, notes=(*_lines(report), f"cameras calibrated: {calibration}"),
-                  fields={**_fields(report), "calibration": calibration})
+    checked, calibration = check_rig(rig), calibration_text(rig)
+    said = Report(checked.verdict, notes=(*_lines(checked), f"cameras calibrated: {calibration}"),
+                  fields={**_fields(checked), "calibration": calibration})
     tell(said, as_json=args.json)
-    return 0 if report.verdict.acceptable else 2
+    return 0 if checked.verdict.acceptable else 2
 
 
-def _fields(report: RigReport) -> dict[str, Any]:
+def _fields(checked: RigCheck) -> dict[str, Any]:
     from rhot_app.calibration.check.checks import WORKING_DISTANCES_M
 
     return {
         "cameras": [{"name": lens.name, "view_deg": [round(math.degrees(angle), 2) for angle in lens.view_rad],
-                     "usable_percent": round(100 * lens.usable, 1)} for lens in report.lenses],
+                     "usable_percent": round(100 * lens.usable, 1)} for lens in checked.lenses],
         "pairs": [{"first": pair.first, "second": pair.second, "baseline_mm": round(pair.baseline_m * 1e3, 3),
                    "toe_in_deg": round(math.degrees(pair.toe_in_rad), 3),
                    "overlap_percent": {f"{z:g}": round(100 * share, 1) for z, share
                                        in zip(WORKING_DISTANCES_M, pair.overlap, strict=True)}}
-                  for pair in report.pairs],
+                  for pair in checked.pairs],
     }
 
 
-def _lines(report: RigReport) -> list[str]:
+def _lines(checked: RigCheck) -> list[str]:
     from rhot_app.calibration.check.checks import WORKING_DISTANCES_M
 
     lines = [f"{lens.name}: sees {math.degrees(lens.view_rad[0]):.1f} x {math.degrees(lens.view_rad[1]):.1f} degrees"
-             for lens in report.lenses]
-    for pair in report.pairs:
+             for lens in checked.lenses]
+    for pair in checked.pairs:
         shares = ", ".join(f"{100 * share:.0f} % at {z:g} m"
                            for z, share in zip(WORKING_DISTANCES_M, pair.overlap, strict=True))
         lines.append(f"{pair.first} - {pair.second}: {pair.baseline_m * 1e3:.1f} mm apart, axes "

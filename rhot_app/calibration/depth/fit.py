@@ -101,7 +101,7 @@ class DepthChart:
 
 
 @dataclass(frozen=True, slots=True)
-class DepthReport:
+class DepthResult:
     """The fitted law and how well it holds. Per used row (N,): `corrected_m` by the law, `theory_m` by eq. 6.12,
     `error_m` what one pixel means there (eq. 7.3). `k_m` makes metres; `z_sd` is the standard deviation of `z`."""
 
@@ -129,7 +129,7 @@ class DepthReport:
                              view_angle_deg=math.degrees(self.geometry.view_angle_rad), k=self.k_m, z=self.z)
 
 
-def fit_depth(table: DepthTable, geometry: DepthGeometry | None = None) -> DepthReport:
+def fit_depth(table: DepthTable, geometry: DepthGeometry | None = None) -> DepthResult:
     """Least squares in log-log space through |disparity| and distance (RHOT eq. 7.4, figure 7.8).
 
     Raises CalibrationError when fewer than three rows can be used or all have the same distance.
@@ -146,7 +146,7 @@ def fit_depth(table: DepthTable, geometry: DepthGeometry | None = None) -> Depth
         k_m=k_m, z=z, constant_m=float(np.median(distances * disparities)), expected_m=geometry.constant_m,
         distances_m=distances, disparities_px=np.array([row.disparity_px for row in rows]),
         relative=corrected / distances - 1.0, rejected=rejected, unit_is_guessed=table.unit_is_guessed)
-    return DepthReport(
+    return DepthResult(
         k_m=k_m, z=z, z_sd=z_sd, geometry=geometry, rows=rows, rejected=rejected, corrected_m=corrected,
         theory_m=depth_from_disparity(disparities, geometry.baseline_m, geometry.width_px, geometry.view_angle_rad),
         error_m=geometry.error_m(distances), chart=_chart(disparities, k_m, z, geometry), verdict=judge_depth(figures))

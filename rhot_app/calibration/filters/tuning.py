@@ -148,7 +148,7 @@ class FilterChoice:
 
 
 @dataclass(frozen=True, slots=True)
-class FilterReport:
+class FilterResult:
     """The proposal, the curves behind it, and what it does: `common` with the settings that hold for all markers, `own`
     with each marker's, which are proposed too where it is `per_marker`."""
 
@@ -184,7 +184,7 @@ class FilterReport:
 
 
 def tune_filters(still: InstantTable, fast: InstantTable, rig: Rig, targets: FilterTargets | None = None,
-                 progress: Progress = silent) -> FilterReport:
+                 progress: Progress = silent) -> FilterResult:
     """Propose both filters' settings for `rig`; the derivative cutoffs stay as they are.
 
     Raises CalibrationError when no marker is measured in both recordings.
@@ -206,7 +206,7 @@ def tune_filters(still: InstantTable, fast: InstantTable, rig: Rig, targets: Fil
                    for figures in (_figures(bench, rig, before, _rows(position.chosen, markers)),
                                    _figures(bench, rig, _own_rows(pixel), _own_rows(position))))
     progress("filters", 1.0)
-    return FilterReport(targets, pixel, position, common, own)
+    return FilterResult(targets, pixel, position, common, own)
 
 
 def _tune(bench: FilterBench, place: Place, betas: Array, now: OneEuroSettings,

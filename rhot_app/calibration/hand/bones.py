@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from rhot_app.calibration.hand import bones_judgement
 from rhot_app.calibration.hand.bones_collector import rigid_pairs
-from rhot_app.calibration.hand.bones_report import (
+from rhot_app.calibration.hand.bones_result import (
     BoneLength,
-    BonesReport,
+    BonesResult,
     Known,
     bone_lengths,
     bone_name,
@@ -37,7 +37,7 @@ from rhot_app.progress import Progress, silent
 Array = NDArray[np.float64]
 
 
-def solve_bones(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = silent) -> BonesReport:
+def solve_bones(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress = silent) -> BonesResult:
     """The hand that wore these markers. `base` gives side, name, limits, and the proportions to begin from.
 
     Landmarks of all joints show every bone by itself. Markers whose coordinates outnumber a pose's unknowns show single
@@ -53,7 +53,7 @@ def solve_bones(tracks: MarkerTracks, base: HandAnatomy, *, progress: Progress =
     return _by_reach(tracks, base, progress)
 
 
-def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> BonesReport:
+def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> BonesResult:
     fit = fit_hand(tracks, base, progress=progress)
     unknowns, bundle = fit.unknowns, fit.bundle
     bones = bone_lengths(unknowns, bundle.vector, fit.covariance)
@@ -75,7 +75,7 @@ def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) ->
         *bones_judgement.bone_findings(bones),
         *bones_judgement.palm_findings(tracks.places),
         *bones_judgement.plausibility_findings(bones, size * 1e3 * unknowns.prior.mean[:BONE_COUNT])]
-    return BonesReport(
+    return BonesResult(
         hand=unknowns.anatomy(bundle.vector), method="movement", size=size, size_std=size_std,
         bones=bones, reaches=reaches, markers=spots,
         rigid=rigid_distances(pairs, unknowns), residual_mm=_rms_mm(bundle.residuals),
@@ -84,14 +84,14 @@ def _by_movement(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) ->
                       f"markers are {error_mm:.1f} mm off.", findings))
 
 
-def _by_reach(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> BonesReport:
+def _by_reach(tracks: MarkerTracks, base: HandAnatomy, progress: Progress) -> BonesResult:
     fit = fit_reach(tracks, base, progress=progress)
     bones = bone_lengths(fit.unknowns, fit.vector, fit.covariance)
     reaches, size, size_std = finger_reaches(fit.unknowns, fit.vector, fit.covariance)
     findings = [*bones_judgement.length_findings(tracks.duration_s),
                 *bones_judgement.bending_findings(fit.reach_m, fit.bending_m),
                 *bones_judgement.few_marker_findings(len(tracks.places))]
-    return BonesReport(
+    return BonesResult(
         hand=fit.unknowns.anatomy(fit.vector), method="reach", size=size, size_std=size_std, bones=bones,
         reaches=reaches, markers=(), rigid=(), residual_mm=None, noise_mm=1e3 * fit.raw_noise_m,
         error_mm=None, seconds=tracks.duration_s, instants=len(tracks.times_s),
@@ -216,7 +216,7 @@ BONE_NAMES: tuple[str, ...] = tuple(bone_name(k // 3, k % 3) for k in range(BONE
 _CENTIMETRES = (1.0, 12.0)  # a length in this range is likely to be one of centimetres
 
 
-def enter_bones(base: HandAnatomy, lengths_mm: Mapping[str, float]) -> BonesReport:
+def enter_bones(base: HandAnatomy, lengths_mm: Mapping[str, float]) -> BonesResult:
     """The hand `base` with some of its bones, named as "index.proximal", replaced. Markers keep their part of the bone.
 
     Raises CalibrationError when there is no such bone, or a length is not a number of millimetres at all.
@@ -238,7 +238,7 @@ def enter_bones(base: HandAnatomy, lengths_mm: Mapping[str, float]) -> BonesRepo
     _, size, size_std = finger_reaches(unknowns, entered.prior.mean, covariance)
     findings = [finding for name, value in lengths_mm.items()
                 if (finding := _judge_length(unknowns, lengths_mm, name, value)) is not None]
-    return BonesReport(
+    return BonesResult(
         hand=hand, method="entered", size=size, size_std=size_std, bones=bones, reaches=reaches, markers=(), rigid=(),
         residual_mm=None, noise_mm=0.0, error_mm=None, seconds=0.0, instants=0,
         verdict=judge(f"{len(lengths_mm)} of {BONE_COUNT} bones entered.", findings))

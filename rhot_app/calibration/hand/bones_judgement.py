@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.hand.bones_collector import RigidPair, find_slip, find_step
-from rhot_app.calibration.hand.bones_report import BoneLength, Known, MarkerSpot
+from rhot_app.calibration.hand.bones_result import BoneLength, Known, MarkerSpot
 from rhot_app.calibration.hand.marker_places import PALM, MarkerPlace, MarkerTracks
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.hand.skeleton import FINGERS, FLEXIONS

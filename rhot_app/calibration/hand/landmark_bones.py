@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.calibration.hand import bones_judgement
-from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport, Known, Reach, bone_name
+from rhot_app.calibration.hand.bones_result import BoneLength, BonesResult, Known, Reach, bone_name
 from rhot_app.calibration.hand.marker_places import SIZE_SD, MarkerTracks
 from rhot_app.calibration.hand.shape import BONE_COUNT, HandUnknowns
 from rhot_app.calibration.verdict import Finding, Grade, judge
@@ -45,7 +45,7 @@ def are_landmarks(tracks: MarkerTracks) -> bool:
     return {place.joint for place in tracks.places} >= set(range(len(JOINTS)))
 
 
-def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesReport:
+def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesResult:
     """The hand whose landmarks these are; `base` gives what landmarks do not show: side, directions, radii, limits.
 
     A bone's stated deviation is the spread of its length, not that of the median. Raises CalibrationError when a bone,
@@ -80,7 +80,7 @@ def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesReport:
     size, spread = float(np.mean(ratios[1:])), float(np.median(spreads / lengths))
     findings = [*_length_findings(tracks.duration_s), *_spread_findings(spread), *_size_findings(size),
                 *bones_judgement.plausibility_findings(bones, size * 1e3 * prior.mean[:BONE_COUNT])]
-    return BonesReport(
+    return BonesResult(
         hand=hand, method="landmarks", size=size,
         size_std=float(1e3 * np.linalg.norm(spreads[1:]) / usual_reaches[1:].sum()), bones=bones,
         reaches=reaches, markers=(), rigid=(), residual_mm=None, noise_mm=float(1e3 * np.median(spreads)),
@@ -89,11 +89,11 @@ def measure_bones(tracks: MarkerTracks, base: HandAnatomy) -> BonesReport:
                       f"{100 * spread:.0f} %; the hand is {100 * size:.1f} % of the base hand.", findings))
 
 
-def spreads_apart(report: BonesReport, hand: HandAnatomy) -> float:
+def spreads_apart(result: BonesResult, hand: HandAnatomy) -> float:
     """How far the measured bones are from those of a hand: rms over them, each by the spread of its length."""
     others = np.array([hand.fingers[name].bones_mm for name in FINGERS]).ravel()
     return float(np.sqrt(np.mean([((one.length_mm - other) / max(one.std_mm, 0.01)) ** 2
-                                  for one, other in zip(report.bones, others, strict=True)])))
+                                  for one, other in zip(result.bones, others, strict=True)])))
 
 
 def _roots(joints: Array, base: HandAnatomy) -> Array:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rhot_app.objects.alignment.drift import Drift
     from rhot_app.objects.alignment.fit import OffsetSearch
     from rhot_app.objects.alignment.motion_stream import MotionStream
-    from rhot_app.objects.alignment.report import AlignmentReport, Coverage
+    from rhot_app.objects.alignment.report import AlignmentSolution, Coverage
     from rhot_app.progress import Progress
 
 LONGEST_SEARCH_S = 60.0
@@ -76,7 +76,7 @@ def write(args: argparse.Namespace, result: AlignmentResult, now: InForce | None
 
     if args.out is None:
         return ""
-    save_alignment(args.out, to_alignment(result.report, result.created))
+    save_alignment(args.out, to_alignment(result.solution, result.created))
     return str(args.out)
 
 
@@ -106,7 +106,7 @@ def report(solved: AlignmentResult, now: InForce | None) -> Report:
     """Where the other world is, how well both agree, and how they moved."""
     from rhot_app.estimation.se3 import quaternion_from_rotation
 
-    result = solved.report
+    result = solved.solution
     fit, coverage = result.fit, result.coverage
     return Report(
         result.verdict, (
@@ -135,7 +135,7 @@ def _figures(place_mm: Value, point_mm: Value, offset_ms: float | None,
             Figure("what is left, rms", rms_mm, "mm", key="rms_mm")]
 
 
-def charts_of(result: AlignmentReport, search: OffsetSearch) -> tuple[Chart, ...]:
+def charts_of(result: AlignmentSolution, search: OffsetSearch) -> tuple[Chart, ...]:
     """The residuals over the speed, and the time offsets tried."""
     import numpy as np
 
@@ -192,7 +192,7 @@ class AlignmentResult:
     """A solved alignment, its search, the one that was in use `before` and its test, None when there was none, and when
     it was solved, ISO 8601."""
 
-    report: AlignmentReport
+    solution: AlignmentSolution
     search: OffsetSearch
     before: Alignment | None
     drift: Drift | None
@@ -285,7 +285,7 @@ def propose(result: AlignmentResult, now: InForce) -> Proposal:
              f"stale: {1e3 * drift.distance_m:.1f} mm off" if drift.stale else "holds")
     rows = tuple(Row(one.name, known.get(one.name, ""), one.brief) for one in said.figures if one.name)
     return Proposal(CALIBRATION.reason, said.verdict, (Row("alignment in use", state, "just solved"), *rows),
-                    changes=(AlignmentChange(before, to_alignment(result.report, result.created), path),),
+                    changes=(AlignmentChange(before, to_alignment(result.solution, result.created), path),),
                     afterwards="" if path is None else f"It is in {path.name}, beside the rig.")
 
 

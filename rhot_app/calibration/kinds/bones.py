@@ -17,7 +17,7 @@ from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.check.health import HealthFigures
-    from rhot_app.calibration.hand.bones_report import BonesReport
+    from rhot_app.calibration.hand.bones_result import BonesResult
     from rhot_app.calibration.hand.marker_places import MarkerTracks
     from rhot_app.calibration.proposal import Proposal
     from rhot_app.hand.anatomy import HandAnatomy
@@ -63,7 +63,7 @@ def observe(args: argparse.Namespace, progress: Progress) -> Observed:
 
 
 def solve(measured: Path | MarkerTracks | Mapping[str, float], base: HandAnatomy, now: InForce | None, *,
-          progress: Progress) -> BonesReport:
+          progress: Progress) -> BonesResult:
     """The hand from a recording with the rig in force, from markers, or from lengths in mm. Raises CalibrationError."""
     from rhot_app.calibration.hand.bones import enter_bones, solve_bones
     from rhot_app.calibration.hand.marker_places import tracks_of
@@ -80,7 +80,7 @@ def solve(measured: Path | MarkerTracks | Mapping[str, float], base: HandAnatomy
     return solve_bones(measured, base, progress=progress)
 
 
-def write(args: argparse.Namespace, result: BonesReport, now: InForce | None) -> str:
+def write(args: argparse.Namespace, result: BonesResult, now: InForce | None) -> str:
     """The hand file."""
     from rhot_app.hand.anatomy import save_hand
 
@@ -195,7 +195,7 @@ def roles_of(rig: Rig) -> tuple[dict[str, str], frozenset[str]]:
             frozenset(marker.id for marker in markers if marker.shape in ("capsule", "band")))
 
 
-def report(result: BonesReport, now: InForce | None) -> Report:
+def report(result: BonesResult, now: InForce | None) -> Report:
     """The size of the hand, its bones and reaches, and where its markers sit."""
     bones = tuple((Figure("bone", bone.name), Figure("length", bone.length_mm, "mm", decimals=1, key="length_mm"),
                    Figure("±", bone.std_mm, "mm", decimals=1, key="std_mm"),
@@ -222,7 +222,7 @@ def report(result: BonesReport, now: InForce | None) -> Report:
             "error_mm": result.error_mm, "seconds": result.seconds, "instants": result.instants})
 
 
-def propose(result: BonesReport, now: InForce) -> Proposal:
+def propose(result: BonesResult, now: InForce) -> Proposal:
     """The rig with this hand."""
     import msgspec
 

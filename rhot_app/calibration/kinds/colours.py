@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from rhot_app.calibration.check.health import HealthFigures
-    from rhot_app.calibration.colour.colours import ColourReport
+    from rhot_app.calibration.colour.colours import ColourResult
     from rhot_app.calibration.colour.paint_region import PaintRegion
     from rhot_app.calibration.colour.samples import MarkedPicture, PaintSamples
     from rhot_app.calibration.proposal import Proposal
@@ -101,14 +101,14 @@ def observe(args: argparse.Namespace, progress: Progress) -> Observed:
 
 
 def solve(samples: Sequence[PaintSamples], views: Sequence[MarkedPicture], known: Mapping[str, Any],
-          now: InForce | None, *, progress: Progress) -> ColourReport:
+          now: InForce | None, *, progress: Progress) -> ColourResult:
     """The models; `known` are the further arguments of `solve_colours`. Raises CalibrationError."""
     from rhot_app.calibration.colour.colours import solve_colours
 
     return solve_colours(samples, views, progress=progress, **known)
 
 
-def write(args: argparse.Namespace, result: ColourReport, now: InForce | None) -> str:
+def write(args: argparse.Namespace, result: ColourResult, now: InForce | None) -> str:
     """The marker set."""
     from rhot_node.markers import save_markers
 
@@ -228,7 +228,7 @@ def _skin(boxes: list[BoxArgument], images: list[YuvImage | PictureError], paths
 
 # -- what is said of the result, and what it changes -------------------------------------------------------------------
 
-def report(result: ColourReport, now: InForce | None) -> Report:
+def report(result: ColourResult, now: InForce | None) -> Report:
     """Every marker's model, which colours are taken for which, what else in the room has them, and the hues."""
     import msgspec
     import numpy as np
@@ -282,7 +282,7 @@ HEADROOM = 1.05
 """Of the chart above the highest column, logarithmically."""
 
 
-def hue_chart(result: ColourReport) -> Chart:
+def hue_chart(result: ColourResult) -> Chart:
     """Which hues the room has, and which of them each marker's bounds let through."""
     import numpy as np
 
@@ -308,7 +308,7 @@ def hue_chart(result: ColourReport) -> Chart:
                  "pixels per picture", tuple(curves), log_y=True)
 
 
-def propose(result: ColourReport, now: InForce) -> Proposal:
+def propose(result: ColourResult, now: InForce) -> Proposal:
     """The rig with the new marker set, and every node whose settings are known with the very same."""
     import msgspec
 

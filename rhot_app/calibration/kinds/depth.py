@@ -13,7 +13,7 @@ from rhot_app.options import add_json_argument, add_out_argument, add_rig_argume
 from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
-    from rhot_app.calibration.depth.fit import DepthGeometry, DepthReport
+    from rhot_app.calibration.depth.fit import DepthGeometry, DepthResult
     from rhot_app.calibration.depth.table import DepthTable
     from rhot_app.calibration.proposal import Proposal
     from rhot_app.progress import Progress
@@ -49,7 +49,7 @@ def observe(args: argparse.Namespace, progress: Progress) -> Observed:
     return Observed((read_depth_table(args.table), _geometry(args, rig)), now)
 
 
-def solve(table: DepthTable, geometry: DepthGeometry, now: InForce | None, *, progress: Progress) -> DepthReport:
+def solve(table: DepthTable, geometry: DepthGeometry, now: InForce | None, *, progress: Progress) -> DepthResult:
     """The law. Raises CalibrationError."""
     from rhot_app.calibration.depth.fit import fit_depth
 
@@ -76,7 +76,7 @@ def _geometry(args: argparse.Namespace, rig: Rig | None) -> DepthGeometry:
     return geometry
 
 
-def report(result: DepthReport, now: InForce | None) -> Report:
+def report(result: DepthResult, now: InForce | None) -> Report:
     """The law and how well each row obeys it; what it takes the place of is in the verdict."""
     import numpy as np
 
@@ -116,7 +116,7 @@ def report(result: DepthReport, now: InForce | None) -> Report:
         (Chart(f"D = {100 * result.k_m:.1f} cm · |x|^{result.z:.4f}", "disparity, px", "distance, cm", curves),))
 
 
-def propose(result: DepthReport, now: InForce) -> Proposal:
+def propose(result: DepthResult, now: InForce) -> Proposal:
     """The rig that takes distances from disparity by this law."""
     import msgspec
 

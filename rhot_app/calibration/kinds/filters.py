@@ -15,7 +15,7 @@ from rhot_node.terminal import add_examples
 
 if TYPE_CHECKING:
     from rhot_app.calibration.filters.meters import FilterTargets, MarkerFigures
-    from rhot_app.calibration.filters.tuning import FilterCurves, FilterReport
+    from rhot_app.calibration.filters.tuning import FilterCurves, FilterResult
     from rhot_app.calibration.proposal import Proposal
     from rhot_app.calibration.report import Array
     from rhot_app.charts import Chart, Curve
@@ -62,7 +62,7 @@ def _targets(args: argparse.Namespace) -> FilterTargets:
 
 
 def solve(still: Path, fast: Path, targets: FilterTargets, per_marker: bool, now: InForce, *,
-          progress: Progress) -> FilterReport:
+          progress: Progress) -> FilterResult:
     """The filters from two recordings. Raises CalibrationError and RecordingError."""
     from rhot_app.calibration.filters.tuning import tune_filters
     from rhot_app.calibration.recorded_observations import read_instants
@@ -76,7 +76,7 @@ FilterStage = Literal["pixel", "position"]
 UNITS: dict[FilterStage, str] = {"pixel": "px/s", "position": "m/s"}
 
 
-def report(result: FilterReport, now: InForce, stage: FilterStage = "position") -> Report:
+def report(result: FilterResult, now: InForce, stage: FilterStage = "position") -> Report:
     """Both filters, and what they do to every marker; the charts are of one `stage`."""
     choice, targets = result.choice, result.targets
     notes = []
@@ -93,7 +93,7 @@ def report(result: FilterReport, now: InForce, stage: FilterStage = "position") 
         charts=charts_of(result, now.rig, stage))
 
 
-def _filter(curves: FilterCurves, result: FilterReport) -> dict[str, Any]:
+def _filter(curves: FilterCurves, result: FilterResult) -> dict[str, Any]:
     import msgspec
 
     return {
@@ -117,7 +117,7 @@ def _marker(one: MarkerFigures) -> tuple[Figure, ...]:
             Figure("new", 1e3 * one.error_m, "mm", key="error_mm"))
 
 
-def propose(result: FilterReport, now: InForce) -> Proposal:
+def propose(result: FilterResult, now: InForce) -> Proposal:
     """The rig with the proposed filters, and what they do to every marker."""
     from rhot_app.calibration.proposal import Row, proposed
 
@@ -130,7 +130,7 @@ def propose(result: FilterReport, now: InForce) -> Proposal:
     return proposed(CALIBRATION.reason, report(result, now), now.rig, result.apply(now.rig), rows=tuple(rows))
 
 
-def charts_of(result: FilterReport, rig: Rig, stage: FilterStage) -> tuple[Chart, ...]:
+def charts_of(result: FilterResult, rig: Rig, stage: FilterStage) -> tuple[Chart, ...]:
     """The thesis's two steps: jitter over min cutoff, lag over beta, with what is allowed and what is chosen."""
     from rhot_app.charts import Chart
 
@@ -146,7 +146,7 @@ def charts_of(result: FilterReport, rig: Rig, stage: FilterStage) -> tuple[Chart
                 *_marks(curves.betas, lag, 1e3 * half * targets.lag_s, curves.chosen.beta)), log_x=True))
 
 
-def _by_marker(result: FilterReport, rig: Rig, x: Array, y: Array) -> list[Curve]:
+def _by_marker(result: FilterResult, rig: Rig, x: Array, y: Array) -> list[Curve]:
     """One curve for each marker that has figures, in its own colour."""
     import numpy as np
 

@@ -16,7 +16,7 @@ from rhot_node.terminal import add_examples
 if TYPE_CHECKING:
     from rhot_app.calibration.board.boards import Board
     from rhot_app.calibration.board.corners import BoardView
-    from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
+    from rhot_app.calibration.lens.intrinsics import IntrinsicsResult
     from rhot_app.calibration.lens.views import ViewSet
     from rhot_app.calibration.proposal import Proposal
     from rhot_app.progress import Progress
@@ -52,7 +52,7 @@ def observe(args: argparse.Namespace, progress: Progress) -> Observed:
 
 
 def solve(views: ViewSet | Sequence[BoardView], board: Board, camera: str, square_pixels: bool, now: InForce | None, *,
-          progress: Progress) -> IntrinsicsReport:
+          progress: Progress) -> IntrinsicsResult:
     """The lens of `camera`, "" for one without a name, from pictures of a board; or from views of a live camera, which
     are numbered. Raises CalibrationError."""
     from rhot_app.calibration.lens import intrinsics
@@ -65,7 +65,7 @@ def solve(views: ViewSet | Sequence[BoardView], board: Board, camera: str, squar
     return replace(found, camera=camera)
 
 
-def write(args: argparse.Namespace, result: IntrinsicsReport, now: InForce | None) -> str:
+def write(args: argparse.Namespace, result: IntrinsicsResult, now: InForce | None) -> str:
     """The intrinsics file, and the rig."""
     from rhot_app.calibration.lens.intrinsics import save_intrinsics
 
@@ -78,7 +78,7 @@ def write(args: argparse.Namespace, result: IntrinsicsReport, now: InForce | Non
     return ", ".join(written)
 
 
-def report(result: IntrinsicsReport, now: InForce | None) -> Report:
+def report(result: IntrinsicsResult, now: InForce | None) -> Report:
     """What the lens is, how well it is known, and of which views."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
     from rhot_app.calibration.lens.intrinsics_checks import WORKING_DISTANCE_M
@@ -112,7 +112,7 @@ def report(result: IntrinsicsReport, now: InForce | None) -> Report:
          "expected_error_mm.distance_m": WORKING_DISTANCE_M, "board_errors_mm": None, **dropped_fields(result.dropped)})
 
 
-def propose(result: IntrinsicsReport, now: InForce) -> Proposal:
+def propose(result: IntrinsicsResult, now: InForce) -> Proposal:
     """The rig with this lens of its camera; poses that were found with the old one are outdated then."""
     from rhot_app.calibration.check.camera_calibration import with_lens
     from rhot_app.calibration.proposal import proposed

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rhot_app.calibration.lens.fit import LensStart
     from rhot_app.calibration.proposal import Proposal
     from rhot_app.calibration.stereo.calibrate import KnownLengths
-    from rhot_app.calibration.stereo.report import CameraFigures, PairFigures, StereoReport
+    from rhot_app.calibration.stereo.result import CameraFigures, PairFigures, StereoResult
     from rhot_app.progress import Progress
     from rhot_app.project import Rig
 
@@ -214,7 +214,7 @@ class StereoViews:
     table: tuple[BoardView | None, ...] = ()
 
 
-def solve(shown: StereoViews, now: InForce, *, progress: Progress) -> StereoReport:
+def solve(shown: StereoViews, now: InForce, *, progress: Progress) -> StereoResult:
     """Cameras put together. Raises CalibrationError."""
     from rhot_app.calibration.lens.fit import find_lens
     from rhot_app.calibration.stereo.calibrate import calibrate
@@ -231,12 +231,12 @@ def solve(shown: StereoViews, now: InForce, *, progress: Progress) -> StereoRepo
     return replace(found, table=place_world(shown.table, views.board, found.figures.state, found.cameras))
 
 
-def report(result: StereoReport, now: InForce | None) -> Report:
+def report(result: StereoResult, now: InForce | None) -> Report:
     """Distances, lenses and errors; where cameras stand above the table. The first pair's figures stand at
     the top of JSON, too."""
     from rhot_app.calibration.bundle.robust_error import what_is_reported
     from rhot_app.calibration.rig_figures import distance_figure, order_of_distortion
-    from rhot_app.calibration.stereo.report import MARKER_NOISE_PX, WORKING_DISTANCE_M
+    from rhot_app.calibration.stereo.result import MARKER_NOISE_PX, WORKING_DISTANCE_M
     from rhot_app.geometry.camera import rig_intrinsics
 
     figures, frame, fields = result.figures, result.table, dropped_fields(result.dropped)
@@ -291,7 +291,7 @@ def report(result: StereoReport, now: InForce | None) -> Report:
             "shots": [{"name": shot.name, "rms_px": shot.rms_px} for shot in figures.shots], **fields})
 
 
-def propose(result: StereoReport, now: InForce) -> Proposal | None:
+def propose(result: StereoResult, now: InForce) -> Proposal | None:
     """The rig with these cameras, in the table's frame where there is one; judged by the rig's own checks as well. None
     where the cameras could not be put together."""
     from rhot_app.calibration.proposal import proposed

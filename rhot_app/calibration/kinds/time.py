@@ -19,7 +19,7 @@ from rhot_node.terminal import add_examples
 if TYPE_CHECKING:
     from rhot_app.calibration.check.health import HealthFigures
     from rhot_app.calibration.proposal import Proposal
-    from rhot_app.calibration.time.offset import TimeReport
+    from rhot_app.calibration.time.offset import TimeResult
     from rhot_app.charts import Chart
     from rhot_app.progress import Progress
     from rhot_app.state import HandState
@@ -43,7 +43,7 @@ def observe(args: argparse.Namespace, progress: Progress) -> Observed:
     return Observed((args.log,), InForce(load_rig(args.rig), args.rig))
 
 
-def solve(log: Path, now: InForce, *, progress: Progress) -> TimeReport:
+def solve(log: Path, now: InForce, *, progress: Progress) -> TimeResult:
     """The cameras' times from a recording. Raises CalibrationError and RecordingError."""
     from rhot_app.calibration.recorded_observations import read_observations
     from rhot_app.calibration.time.offset import calibrate_times
@@ -52,7 +52,7 @@ def solve(log: Path, now: InForce, *, progress: Progress) -> TimeReport:
     return calibrate_times(read_observations(log, now.rig)[1], now.rig, progress)
 
 
-def report(result: TimeReport, now: InForce) -> Report:
+def report(result: TimeResult, now: InForce) -> Report:
     """Each camera's offset and row time, and how far its rays miss the first camera's."""
     rows = []
     for camera, node in zip(result.cameras, now.rig.nodes, strict=True):
@@ -74,7 +74,7 @@ def report(result: TimeReport, now: InForce) -> Report:
                   fields={"row_times_agree": result.row_times_agree}, charts=charts_of(result))
 
 
-def charts_of(result: TimeReport) -> tuple[Chart, ...]:
+def charts_of(result: TimeResult) -> tuple[Chart, ...]:
     """For each camera but the first: misses over speed as they were and are (a delay is the slope), and the search."""
     from rhot_app.charts import Chart, Curve
 
@@ -90,7 +90,7 @@ def charts_of(result: TimeReport) -> tuple[Chart, ...]:
     return tuple(charts[:4])
 
 
-def propose(result: TimeReport, now: InForce) -> Proposal:
+def propose(result: TimeResult, now: InForce) -> Proposal:
     """The rig with corrected offsets; and where a node's own row time is wrong, the node with the right one, if its
     settings are known."""
     import msgspec

@@ -47,7 +47,7 @@ class ViewFit:
 
 
 @dataclass(frozen=True, slots=True)
-class IntrinsicsReport:
+class IntrinsicsResult:
     """Everything a page or a file needs to know.
 
     `lens` (12,), see `geometry.camera`, for pictures of `size` (width, height), and its `covariance` (12, 12) with
@@ -92,7 +92,7 @@ class IntrinsicsReport:
 
 
 def solve(views: Sequence[BoardView], board: Board, *, square_pixels: bool = False, dropped: Sequence[Dropped] = (),
-          noticed: Sequence[Finding] = (), progress: Progress = silent) -> IntrinsicsReport:
+          noticed: Sequence[Finding] = (), progress: Progress = silent) -> IntrinsicsResult:
     """Calibrate one camera from `views`, all of one picture size.
 
     `square_pixels` forces fx = fy. `dropped` pictures and `noticed` findings of whoever read the views join the report.
@@ -108,7 +108,7 @@ def solve(views: Sequence[BoardView], board: Board, *, square_pixels: bool = Fal
 
 
 def _report(fit: LensFit, views: Sequence[BoardView], board: Board, dropped: tuple[Dropped, ...],
-            noticed: Sequence[Finding]) -> IntrinsicsReport:
+            noticed: Sequence[Finding]) -> IntrinsicsResult:
     used = [views[index] for index in fit.kept]
     size = used[0].size
     usual = float(np.median(fit.view_rms))
@@ -126,7 +126,7 @@ def _report(fit: LensFit, views: Sequence[BoardView], board: Board, dropped: tup
         board_errors=fit.board_errors, blur_px=float(np.nanmedian([view.blur_px for view in used] + [0.0])),
         square_px=float(np.median([view.square_px for view in used])))
     summary = f"rms {rms:.2f} px over {len(used)} views, f {fit.lens[0]:.1f} px."
-    return IntrinsicsReport(
+    return IntrinsicsResult(
         board, fit.lens, fit.covariance, size, rms,
         tuple(ViewFit(view.source, float(off), len(view.ids), view.blur_px, view.square_px)
               for view, off in zip(used, fit.view_rms, strict=True)),
@@ -214,22 +214,22 @@ def load_intrinsics(path: Path) -> IntrinsicsFile:
     return read_document(path, IntrinsicsFile, format_name=FORMAT, version=VERSION, error=CalibrationError)
 
 
-def save_intrinsics(path: Path, report: IntrinsicsReport) -> None:
+def save_intrinsics(path: Path, result: IntrinsicsResult) -> None:
     """Write a calibration atomically. Raises CalibrationError when the folder cannot be written."""
-    document = to_file(report)
+    document = to_file(result)
     try:
         write_document(path, document)
     except OSError as exc:
         raise CalibrationError(f"{path}: cannot be written ({exc.strerror}); nothing was changed.") from exc
 
 
-def to_file(report: IntrinsicsReport) -> IntrinsicsFile:
+def to_file(result: IntrinsicsResult) -> IntrinsicsFile:
     """What is kept of a calibration."""
-    lens = report.intrinsics
+    lens = result.intrinsics
     return IntrinsicsFile(
-        report.size, lens.fx, lens.fy, lens.cx, lens.cy, lens.distortion,
-        {name: std for name, (_, std) in report.parameters.items()}, report.rms_px, len(report.views),
-        _board(report.board), datetime.now(UTC).isoformat(timespec="seconds"))
+        result.size, lens.fx, lens.fy, lens.cx, lens.cy, lens.distortion,
+        {name: std for name, (_, std) in result.parameters.items()}, result.rms_px, len(result.views),
+        _board(result.board), datetime.now(UTC).isoformat(timespec="seconds"))
 
 
 def _board(board: Board) -> BoardUsed:

@@ -1,4 +1,4 @@
-"""The stereo calibration as a whole: shared views of two or more cameras in, a report with its verdict out."""
+"""The stereo calibration as a whole: shared views of two or more cameras in, a result with its verdict out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rhot_app.calibration.stereo.adjust import FEWEST_SHOTS, StereoSolution, adj
 from rhot_app.calibration.stereo.checks import arrangement_findings, dropped_findings, fit_findings
 from rhot_app.calibration.stereo.diagnosis import Doubtful, explain, explain_shot
 from rhot_app.calibration.stereo.points import LensEvidence, lens_evidence, mismatch_finding
-from rhot_app.calibration.stereo.report import StereoFigures, StereoReport, figures_of
+from rhot_app.calibration.stereo.result import StereoFigures, StereoResult, figures_of
 from rhot_app.calibration.stereo.ruler import RulerReading, baseline_finding, read_ruler, ruler_finding
 from rhot_app.calibration.stereo.start import Link, PlacedShot, WorldFrame, all_links, place_shot, spanning_tree
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
@@ -51,7 +51,7 @@ class KnownLengths:
 def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool = False,
               known: KnownLengths | None = None, remembered: Sequence[LensStart | None] = (),
               dropped: Sequence[Dropped] = (), noticed: Sequence[Finding] = (),
-              progress: Progress = silent) -> StereoReport:
+              progress: Progress = silent) -> StereoResult:
     """Put the cameras of `views` together.
 
     `lenses` one per camera; `refine` lets given ones change within their standard deviations. `remembered` lenses of an
@@ -66,7 +66,7 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
     noticed = [*noticed, *(lens.trouble for lens in lenses if lens.trouble is not None)]
     if isinstance(outcome, Finding):
         summary = f"{' and '.join(views.cameras)} cannot be calibrated together."
-        return StereoReport(views.cameras, None, tuple(dropped), summary, judge(summary, [*noticed, outcome]))
+        return StereoResult(views.cameras, None, tuple(dropped), summary, judge(summary, [*noticed, outcome]))
     progress("measuring what came out", 0.97)
     figures = figures_of(outcome, lenses, [shot.name for shot in views.shots])
     ruler = None if known.ruler is None else read_ruler(known.ruler, figures.state)
@@ -78,7 +78,7 @@ def calibrate(views: SharedViews, lenses: Sequence[LensStart], *, refine: bool =
     findings = [*noticed, *_findings(figures, outcome, lenses, known, evidence, every)]
     progress("stereo calibration", 1.0)
     summary = _summary(figures)
-    return StereoReport(views.cameras, figures, every, summary, judge(summary, findings))
+    return StereoResult(views.cameras, figures, every, summary, judge(summary, findings))
 
 
 def _check_sizes(views: SharedViews, lenses: Sequence[LensStart]) -> None:
@@ -246,13 +246,13 @@ def rig_findings(rig: Rig, cameras: Sequence[str]) -> list[Finding]:
     return found
 
 
-def rig_verdict(report: StereoReport, rig: Rig, frame: WorldFrame | None = None) -> Verdict:
+def rig_verdict(result: StereoResult, rig: Rig, frame: WorldFrame | None = None) -> Verdict:
     """The verdict on writing `rig`: the calibration's, the rig's own checks, and the world frame's; each thing once."""
-    found = list(report.verdict.findings)
-    named = report.verdict.codes & ARRANGED
-    found += [each for each in rig_findings(rig, report.cameras) if not (named and each.code in ARRANGED)]
+    found = list(result.verdict.findings)
+    named = result.verdict.codes & ARRANGED
+    found += [each for each in rig_findings(rig, result.cameras) if not (named and each.code in ARRANGED)]
     found += frame.verdict.findings if frame is not None else ()
-    return judge(report.summary, list({finding.figure: finding for finding in found}.values()))
+    return judge(result.summary, list({finding.figure: finding for finding in found}.values()))
 
 
 def _matrix(pose: CameraPose) -> Array:

@@ -14,7 +14,7 @@ from rhot_app.calibration.board.shared_views import Dropped
 from rhot_app.calibration.bundle.robust_error import in_words
 from rhot_app.calibration.stereo.adjust import ALIKE_RAD
 from rhot_app.calibration.stereo.points import LensEvidence
-from rhot_app.calibration.stereo.report import WORKING_DISTANCE_M, StereoFigures
+from rhot_app.calibration.stereo.result import WORKING_DISTANCE_M, StereoFigures
 from rhot_app.calibration.verdict import Finding, Grade
 from rhot_app.geometry.transforms import inverse
 

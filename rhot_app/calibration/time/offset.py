@@ -51,7 +51,7 @@ class TimePlot:
 
 
 @dataclass(frozen=True, slots=True)
-class TimeReport:
+class TimeResult:
     """`cameras` in the rig's order, the first is the reference. `plots` (one per other camera) by its index."""
 
     cameras: tuple[CameraTime, ...]
@@ -66,7 +66,7 @@ class TimeReport:
         return msgspec.structs.replace(rig, nodes=nodes)
 
 
-def calibrate_times(table: ObservationTable, rig: Rig, progress: Progress = silent) -> TimeReport:
+def calibrate_times(table: ObservationTable, rig: Rig, progress: Progress = silent) -> TimeResult:
     """Solve for all cameras of `rig` from what they saw.
 
     Raises CalibrationError when there are not two calibrated cameras that saw the same moving markers.
@@ -88,7 +88,7 @@ def calibrate_times(table: ObservationTable, rig: Rig, progress: Progress = sile
         drifts_s={camera: plot.drift_s for camera, plot in plots.items()},
         clock_bounds_s=tuple(camera.clock_bound_s for camera in model.cameras), misfit=misfit_cause(rig))
     progress("times", 1.0)
-    return TimeReport(cameras, agree, plots, judge_times(figures))
+    return TimeResult(cameras, agree, plots, judge_times(figures))
 
 
 def _require_geometry(rig: Rig) -> None:

@@ -21,7 +21,7 @@ from rhot_app.project import Metres
 from rhot_node.files import read_document, write_document
 
 if TYPE_CHECKING:
-    from rhot_app.objects.alignment.report import AlignmentReport
+    from rhot_app.objects.alignment.report import AlignmentSolution
 
 Array = NDArray[np.float64]
 
@@ -79,10 +79,10 @@ class Alignment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("covariance is not symmetric, or a variance is negative")
 
 
-def to_alignment(report: AlignmentReport, created: str | None = None) -> Alignment:
+def to_alignment(solution: AlignmentSolution, created: str | None = None) -> Alignment:
     """What is kept of a calibration that was solved at `created`, ISO 8601; None: now."""
-    fit = report.fit
-    covariance = 0.5 * (report.covariance + report.covariance.T)
+    fit = solution.fit
+    covariance = 0.5 * (solution.covariance + solution.covariance.T)
     return Alignment(_transform(fit.rig_from_foreign), _transform(fit.tracker_from_body), fit.offset_s,
                      tuple(tuple(map(float, row)) for row in covariance), fit.noise_m, fit.rms_m, fit.inlier_ratio,
                      created or datetime.now(UTC).isoformat(timespec="seconds"))

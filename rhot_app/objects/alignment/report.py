@@ -63,7 +63,7 @@ class Coverage:
 
 
 @dataclass(frozen=True, slots=True)
-class AlignmentReport:
+class AlignmentSolution:
     """A solved alignment with its coverage and verdict.
 
     `covariance` (n, n) in the order of `alignment.fit.TRANSLATION`, by noise and by errors that last. Of it
@@ -83,14 +83,14 @@ class AlignmentReport:
 
 
 def calibrate_alignment(foreign: MotionStream, rig: MotionStream, search_s: float = SEARCH_S,
-                        progress: Callable[[str, float], None] = lambda text, part: None) -> AlignmentReport:
+                        progress: Callable[[str, float], None] = lambda text, part: None) -> AlignmentSolution:
     """Align two streams and judge the result. Raises CalibrationError as `align` does."""
     fit, search = align(foreign, rig, search_s, progress)
     progress("alignment", 1.0)
     return judge_alignment(fit, search)
 
 
-def judge_alignment(fit: AlignmentFit, search: OffsetSearch) -> AlignmentReport:
+def judge_alignment(fit: AlignmentFit, search: OffsetSearch) -> AlignmentSolution:
     """The report on a fit and the search that it began with."""
     coverage, covariance = coverage_of(fit), fit.covariance + fit.lasting
     place, turn, point, offset = (math.sqrt(max(float(np.trace(block)), 0.0)) for block in (
@@ -105,7 +105,7 @@ def judge_alignment(fit: AlignmentFit, search: OffsetSearch) -> AlignmentReport:
     summary = (f"positions of the other tracker are known in the rig to ±{1e3 * place:.2f} mm and "
                f"±{math.degrees(turn):.3f} degrees, its clock to ±{1e3 * offset:.2f} ms; {1e3 * fit.rms_m:.2f} mm rms "
                f"remain, {100 * fit.inlier_ratio:.0f} % of the samples agree.")
-    return AlignmentReport(fit, coverage, covariance, place, turn, point, offset, search.scale,
+    return AlignmentSolution(fit, coverage, covariance, place, turn, point, offset, search.scale,
                            judge(summary, findings))
 
 

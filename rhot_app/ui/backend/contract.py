@@ -1,6 +1,6 @@
 """What the window needs of the processes behind it, and the words for it; `session.Session` is the real one.
 
-Every function that takes a `Report` waits, and is meant for a worker thread.
+Every function that takes a `Progress` waits, and is meant for a worker thread.
 """
 
 from __future__ import annotations
@@ -11,10 +11,8 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from rhot_app.engine.status import Published
+from rhot_app.progress import Progress
 from rhot_app.project import Rig
-
-Report = Callable[[str, float], None]
-"""``report(text, fraction)``; raises when the work is to be given up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +47,7 @@ class TwinPace:
     preset_hz: float
 
 
-class Asker(Protocol):
+class CommandClient(Protocol):
     """Gives commands to the engine; one per thread."""
 
     def command(self, name: str, *, timeout_s: float = 3.0, **arguments: Any) -> dict[str, Any]:
@@ -59,6 +57,10 @@ class Asker(Protocol):
     def close(self) -> None:
         """Disconnect."""
         ...
+
+
+Connect = Callable[[], CommandClient]
+"""Makes a client for the thread that calls it."""
 
 
 class Listener(Protocol):
@@ -80,7 +82,7 @@ class Backend(Protocol):
         """A client that hears the hand's states."""
         ...
 
-    def asker(self) -> Asker:
+    def command_client(self) -> CommandClient:
         """A client that only gives commands; for workers, each its own."""
         ...
 
@@ -88,19 +90,19 @@ class Backend(Protocol):
         """Whether an engine runs already that the window should attach to."""
         ...
 
-    def attach(self, report: Report) -> Opened:
+    def attach(self, progress: Progress) -> Opened:
         """Attach to the running engine."""
         ...
 
-    def open_rig(self, path: Path, report: Report) -> Opened:
+    def open_rig(self, path: Path, progress: Progress) -> Opened:
         """Start an engine on a rig file, and before it the cameras of this computer that belong to it."""
         ...
 
-    def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
+    def open_twin(self, choice: TwinChoice, progress: Progress) -> Opened:
         """Start simulated nodes and an engine on their rig."""
         ...
 
-    def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
+    def restart_engine(self, path: str, start: bool, progress: Progress) -> Opened:
         """Start the engine again after it vanished."""
         ...
 
@@ -132,7 +134,7 @@ class Backend(Protocol):
         ...
 
     def save_scene(self, path: Path) -> None:
-        """Write the scene of the simulated rig with what it shows now. Raises SimulatorError, OSError."""
+        """Write the scene of the simulated rig with what it shows now. Raises SimulatorError."""
         ...
 
     def give_up(self) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rhot_app.errors import EngineError, RhotError
 from rhot_app.state import HandState
-from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.backend.contract import CommandClient, Connect, Listener
 from rhot_app.ui.backend.reader import END_S, Reader
 from rhot_app.ui.language import tr
 from rhot_node.errors import PictureError
@@ -51,8 +51,8 @@ class Picture:
 class LiveFeed(Reader):
     """Newest pictures of some cameras, from any thread."""
 
-    def __init__(self, cameras: Mapping[str, int], connect: Callable[[], Asker], rate_hz: float = RATE_HZ) -> None:
-        """`cameras` are node ids by name; `connect` makes an asker for each thread."""
+    def __init__(self, cameras: Mapping[str, int], connect: Connect, rate_hz: float = RATE_HZ) -> None:
+        """`cameras` are node ids by name; `connect` makes a client for each thread."""
         super().__init__([(name,) for name in cameras for _ in range(_IN_FLIGHT)])
         self.cameras = tuple(cameras)
         self._node_ids = dict(cameras)
@@ -105,12 +105,12 @@ class LiveFeed(Reader):
             return self._problems[camera]
 
     def _run(self, camera: str) -> None:
-        with contextlib.closing(self._connect()) as asker:
+        with contextlib.closing(self._connect()) as client:
             while not self._ending.is_set():
                 self._resumed.wait()
                 if self._ending.wait(self._wait_s(camera)):
                     break
-                self.step(camera, asker)
+                self.step(camera, client)
 
     def _wait_s(self, camera: str) -> float:
         """Take the next turn of this camera; how long until then."""
@@ -120,10 +120,10 @@ class LiveFeed(Reader):
             self._due_s[camera] = turn + self._period_s
         return turn - now
 
-    def step(self, camera: str, asker: Asker) -> None:
+    def step(self, camera: str, client: CommandClient) -> None:
         """Ask for one picture and keep it; a failure becomes the camera's problem."""
         try:
-            picture = ask_picture(asker.command, camera, self._node_ids[camera])
+            picture = ask_picture(client.command, camera, self._node_ids[camera])
         except RhotError as exc:
             with self._lock:
                 self._problems[camera] = str(exc)

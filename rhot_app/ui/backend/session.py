@@ -29,9 +29,10 @@ from rhot_app.engine.process import (
     started_processes,
 )
 from rhot_app.errors import EngineError, RecordingError, RhotError, SimulatorError, SourceError
+from rhot_app.progress import Progress
 from rhot_app.project import load_rig, parse_rig, save_rig, with_tracker
 from rhot_app.sources.cameras.camera_set import camera_set_of
-from rhot_app.ui.backend.contract import Opened, Report, TwinChoice, TwinPace
+from rhot_app.ui.backend.contract import Opened, TwinChoice, TwinPace
 from rhot_app.ui.language import tr, tr_noop
 from rhot_node.compiled import WINDOW
 from rhot_node.terminal import before
@@ -81,7 +82,7 @@ class Session:
         """A client for this directory; it outlives restarts of the engine."""
         return EngineClient(self._place.path)
 
-    def asker(self) -> EngineClient:
+    def command_client(self) -> EngineClient:
         """A client for this directory that only gives commands."""
         return EngineClient(self._place.path, states=False, events=False)
 
@@ -89,9 +90,9 @@ class Session:
         """Whether an engine runs here."""
         return running_engine(self._place.path) is not None
 
-    def attach(self, report: Report) -> Opened:
+    def attach(self, progress: Progress) -> Opened:
         """Attach to the engine that runs here, whoever started it; raises EngineError when it does not answer."""
-        report(tr("Attaching to the running engine …"), 0.5)
+        progress(tr("Attaching to the running engine …"), 0.5)
         ours = self._engine_is_ours()
         with EngineClient(self._place.path, states=False) as client:
             hello = client.command("hello")
@@ -103,19 +104,19 @@ class Session:
         self._twin_started = simulated
         return Opened(rig, path, bool(hello.get("running")), ours, simulated)
 
-    def open_rig(self, path: Path, report: Report) -> Opened:
+    def open_rig(self, path: Path, progress: Progress) -> Opened:
         """End what the app ran before and start an engine on `path`, and before it the cameras of this computer that
         belong to that rig; raises RigError, SourceError or EngineError."""
-        report(tr("Reading the rig file …"), 0.1)
+        progress(tr("Reading the rig file …"), 0.1)
         rig, cameras = load_rig(path), camera_set_of(path)
-        self._clear(report)
-        self._compile(part_of(rig), report)
+        self._clear(progress)
+        self._compile(part_of(rig), progress)
         if cameras is None:
-            return self._start_engine(path, report)
-        self._start_cameras(path, len(cameras.cameras), report)
-        return dataclasses.replace(self._start_engine(path, report), begin=True)
+            return self._start_engine(path, progress)
+        self._start_cameras(path, len(cameras.cameras), progress)
+        return dataclasses.replace(self._start_engine(path, progress), begin=True)
 
-    def open_twin(self, choice: TwinChoice, report: Report) -> Opened:
+    def open_twin(self, choice: TwinChoice, progress: Progress) -> Opened:
         """Start the simulated nodes, then an engine on the rig that they write; raises SimulatorError, EngineError."""
         if choice.scene is not None:
             from rhot_app.simulator.scene.scene_file import read_scene
@@ -124,26 +125,26 @@ class Session:
             if choice.motion is not None:
                 fields.set("show.motion", choice.motion, "show.motion")
             fields.require()  # what cannot be is said while the other rig still runs
-        self._clear(report)
-        self._compile(WINDOW, report)
-        report(tr("Starting two simulated cameras …"), 0.15)
-        rig_path = self._start_twin(choice, report)
+        self._clear(progress)
+        self._compile(WINDOW, progress)
+        progress(tr("Starting two simulated cameras …"), 0.15)
+        rig_path = self._start_twin(choice, progress)
         rig = with_tracker(load_rig(rig_path), choice.tracker)
         save_rig(rig_path, rig)
-        self._compile(part_of(rig), report)
-        return self._start_engine(rig_path, report)
+        self._compile(part_of(rig), progress)
+        return self._start_engine(rig_path, progress)
 
-    def restart_engine(self, path: str, start: bool, report: Report) -> Opened:
+    def restart_engine(self, path: str, start: bool, progress: Progress) -> Opened:
         """Start the engine again after it died or hangs: on the same rig, and it continues what it recorded. `start`
         has it tell the nodes to stream at once."""
         if not path:
             raise EngineError(tr("The engine had no rig file, so it cannot be started again. Open a rig."))
-        report(tr("Starting the engine again …"), 0.3)
+        progress(tr("Starting the engine again …"), 0.3)
         if self.found() and self._recorded_log() is None:
             self._require_ours()
             end_started(self._place, [ENGINE_ROLE], HUNG_S)
         ensure_engine(Path(path), self._place.path, start=start, resume=True, timeout_s=START_TIMEOUT_S)
-        return self.attach(report)
+        return self.attach(progress)
 
     def twin_alive(self) -> bool:
         """True unless simulated nodes were started and have ended since."""
@@ -176,7 +177,7 @@ class Session:
 
     def save_scene(self, path: Path) -> None:
         """The scene that the twin was started with, with what it shows now and its lamp, as a file. Raises
-        SimulatorError, OSError."""
+        SimulatorError."""
         from rhot_app.simulator.nodes.remote import SCENE_NAME
         from rhot_app.simulator.scene.scene_file import read_scene, write_scene
 
@@ -186,7 +187,11 @@ class Session:
         fields.show = msgspec.to_builtins(now.show)
         if now.lamp != fields.scene().settings.lamp:
             fields.settings["lamp"] = msgspec.to_builtins(now.lamp)
-        write_scene(path, fields)
+        try:
+            write_scene(path, fields)
+        except OSError as exc:
+            raise SimulatorError(tr("{out}: cannot be written ({strerror}); nothing was saved.", out=path,
+                                    strerror=exc.strerror)) from exc
 
     def give_up(self) -> None:
         """End everything that the app started; what waits for it then fails and is forgotten."""
@@ -209,11 +214,11 @@ class Session:
         pid = running_engine(self._place.path)
         return any(process.pid == pid for process in started_processes(self._place))
 
-    def _clear(self, report: Report) -> None:
+    def _clear(self, progress: Progress) -> None:
         if self.found():
             self._require_ours()
             self._require_not_recording()
-        report(tr("Ending what ran before …"), 0.12)
+        progress(tr("Ending what ran before …"), 0.12)
         self._twin_started = False
         end_started(self._place)
 
@@ -232,7 +237,7 @@ class Session:
 
     def _recorded_log(self) -> str | None:
         """What the running engine records, "" for nothing; None when it gives no answer."""
-        with contextlib.suppress(EngineError), self.asker() as client:
+        with contextlib.suppress(EngineError), self.command_client() as client:
             return str(client.command("status", timeout_s=ANSWER_S)["status"]["log_path"])
         return None
 
@@ -241,16 +246,16 @@ class Session:
             raise EngineError(tr("An engine that was started by hand runs in {path}. Stop it first, or start the app "
                                  "with another --directory.", path=self._place.path))
 
-    def _compile(self, part: str, report: Report) -> None:
-        compile_part(part, report, lambda pid: remember_process(self._place, pid, COMPILER_ROLE))
+    def _compile(self, part: str, progress: Progress) -> None:
+        compile_part(part, progress, lambda pid: remember_process(self._place, pid, COMPILER_ROLE))
 
-    def _start_engine(self, path: Path, report: Report) -> Opened:
-        report(tr("Starting the engine …"), 0.5)
+    def _start_engine(self, path: Path, progress: Progress) -> Opened:
+        progress(tr("Starting the engine …"), 0.5)
         ensure_engine(path, self._place.path, timeout_s=START_TIMEOUT_S)
-        report(tr("Asking the engine for its rig …"), 0.9)
+        progress(tr("Asking the engine for its rig …"), 0.9)
         return self.attach(lambda text, fraction: None)
 
-    def _start_twin(self, choice: TwinChoice, report: Report) -> Path:
+    def _start_twin(self, choice: TwinChoice, progress: Progress) -> Path:
         """Start the twin in the background."""
         rig_path, output = self._place.path / TWIN_RIG, self._place.path / TWIN_OUTPUT
         errors = self._place.twin_log_file
@@ -260,20 +265,20 @@ class Session:
                    "--directory", str(self._place.path), "--rig", str(rig_path),
                    "--while-locked", str(self._place.lock_file)]
         self._start_nodes(command, TWIN_ROLE, output, errors, _Words(tr_noop("simulated cameras"), 2, SimulatorError),
-                          report)
+                          progress)
         self._twin_started = True
         return rig_path
 
-    def _start_cameras(self, rig_path: Path, count: int, report: Report) -> None:
+    def _start_cameras(self, rig_path: Path, count: int, progress: Progress) -> None:
         """Start the nodes of this computer's cameras in the background."""
         errors = self._place.cameras_log_file
         command = [*CAMERAS_COMMAND, "--rig", str(rig_path.absolute()), "--log", str(errors), "--while-locked",
                    str(self._place.lock_file)]
         self._start_nodes(command, CAMERAS_ROLE, self._place.path / CAMERAS_OUTPUT, errors,
-                          _Words(tr_noop("cameras"), count, SourceError), report)
+                          _Words(tr_noop("cameras"), count, SourceError), progress)
 
     def _start_nodes(self, command: list[str], role: str, output: Path, errors: Path, words: _Words,
-                     report: Report) -> None:
+                     progress: Progress) -> None:
         """Start a process that runs nodes, and wait for its ready line, which goes to a file so that it outlives this
         process."""
         with contextlib.suppress(OSError):
@@ -283,7 +288,7 @@ class Session:
                                        start_new_session=True)
         remember_process(self._place, process.pid, role)
         try:
-            _await_ready(process, output, errors, words, report)
+            _await_ready(process, output, errors, words, progress)
         except BaseException:
             end_started(self._place, [role])
             raise
@@ -298,7 +303,8 @@ class _Words:
     error: type[RhotError]
 
 
-def _await_ready(process: subprocess.Popen[bytes], output: Path, errors: Path, words: _Words, report: Report) -> None:
+def _await_ready(process: subprocess.Popen[bytes], output: Path, errors: Path, words: _Words,
+                 progress: Progress) -> None:
     begin = time.monotonic()
     while time.monotonic() - begin < START_TIMEOUT_S:
         if _has_ready_line(output):
@@ -307,7 +313,7 @@ def _await_ready(process: subprocess.Popen[bytes], output: Path, errors: Path, w
             lines = errors.read_text(errors="replace").strip().splitlines()
             said = lines[-1] if lines else tr("they said nothing; see {errors}", errors=errors)
             raise words.error(tr("The {what} did not start: {said}", what=tr(words.what), said=said))
-        report(tr("Starting {n} camera …", "Starting {n} cameras …", words.count),
+        progress(tr("Starting {n} camera …", "Starting {n} cameras …", words.count),
                0.15 + 0.3 * min(1.0, (time.monotonic() - begin) / 15.0))
         time.sleep(0.05)
     raise words.error(tr("The {what} were not ready within {limit:.0f} s; see {errors}.", what=tr(words.what),

@@ -16,7 +16,7 @@ from PySide6.QtCore import QObject, Signal
 from rhot_app.engine.status import Advice
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
-from rhot_app.ui.backend.contract import Asker, Backend, Listener, Opened, TwinChoice, TwinPace
+from rhot_app.ui.backend.contract import Backend, CommandClient, Listener, Opened, TwinChoice, TwinPace
 from rhot_app.ui.backend.live import SILENCE_S, Live
 from rhot_app.ui.common.job import Job, Progress
 from rhot_app.ui.language import tr
@@ -46,9 +46,9 @@ class EngineLink(QObject):
 
     def command(self, name: str, **args: Any) -> None:
         """Give a command; only its failure is heard of."""
-        self.work(lambda asker: asker.command(name, **args), lambda answer: None)
+        self.work(lambda client: client.command(name, **args), lambda answer: None)
 
-    def work(self, op: Callable[[Asker], Any], done: Callable[[Any], None],
+    def work(self, op: Callable[[CommandClient], Any], done: Callable[[Any], None],
              failed: Callable[[str], None] | None = None) -> None:
         """Ask something short in a worker, by a client of its own; nothing happens while no engine is wanted.
 
@@ -58,8 +58,8 @@ class EngineLink(QObject):
             return
 
         def ask() -> Any:
-            with contextlib.closing(self._backend.asker()) as asker:
-                return op(asker)
+            with contextlib.closing(self._backend.command_client()) as client:
+                return op(client)
 
         self._jobs = [job for job in self._jobs if job.running]
         self._jobs.append(Job(lambda progress: ask(), done, failed or self._failed, None, self).start())
@@ -145,13 +145,13 @@ class Controller(QObject):
 
     def open_rig(self, path: Path) -> None:
         """Open a rig file."""
-        self._open(tr("Opening the rig …"), lambda report: self.backend.open_rig(path, report))
+        self._open(tr("Opening the rig …"), lambda progress: self.backend.open_rig(path, progress))
 
     def open_twin(self, choice: TwinChoice, *, begin: bool = True) -> None:
         """Start the simulated rig; `begin` starts the tracking as soon as it is there."""
         self.twin_choice = choice
         self._begin_after_opening = begin
-        self._open(tr("Starting the simulated rig …"), lambda report: self.backend.open_twin(choice, report))
+        self._open(tr("Starting the simulated rig …"), lambda progress: self.backend.open_twin(choice, progress))
 
     def _open(self, text: str, op: Callable[[Callable[[str, float], None]], Opened]) -> None:
         if self._job is not None:

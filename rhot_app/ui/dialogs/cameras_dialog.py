@@ -30,6 +30,7 @@ from rhot_app.sources.cameras.camera_set import NONE_FOUND, CameraSource, Prepar
 from rhot_app.sources.cameras.camera_source import CameraPreview, check_source, source_of
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
@@ -87,9 +88,21 @@ class CamerasDialog(QDialog):
         self._shown: tuple[object, str] = (None, "")
         self._number = 0
         self._job: Job | None = None
-        intro = QLabel(tr("Tick one camera or more, and look at each. The first one tracks alone until the others are "
-                          "put together with it."))
-        intro.setWordWrap(True)
+        self._make_list()
+        self._make_view(scheme)
+        self._make_questions()
+        self._lay_out()
+        self.resize(*_SIZE_PX)
+        self._timer = QTimer(self, interval=TICK_MS)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start()
+        self.finished.connect(lambda code: self._end())
+        self._look(-1)
+        self._show_whether_ready()
+        self.search()
+
+    def _make_list(self) -> None:
+        """What can be chosen, and how more is added."""
         self.list = QListWidget()
         self.list.setFixedWidth(_LIST_PX)
         self.list.setSpacing(4)
@@ -98,14 +111,17 @@ class CamerasDialog(QDialog):
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.list.currentRowChanged.connect(self._look)
         self.list.itemChanged.connect(lambda item: self._show_whether_ready())
-        self.film_button = self._button(tr("Films …"), tr("Add films of one camera each, recorded at the same time."),
+        self.film_button = plain_button(tr("Films …"), tr("Add films of one camera each, recorded at the same time."),
                                         self.choose_films)
-        self.folder_button = self._button(tr("Folder …"), tr("Add a folder of pictures, or of raw frames."),
+        self.folder_button = plain_button(tr("Folder …"), tr("Add a folder of pictures, or of raw frames."),
                                           self.choose_folder)
-        self.address_button = self._button(tr("Network …"), tr("Add a camera or a phone that sends its pictures by "
+        self.address_button = plain_button(tr("Network …"), tr("Add a camera or a phone that sends its pictures by "
                                                                "HTTP (motion JPEG) or RTSP."), self.choose_address)
-        self.again_button = self._button(tr("Search again"), tr("Look for webcams that were plugged in meanwhile."),
+        self.again_button = plain_button(tr("Search again"), tr("Look for webcams that were plugged in meanwhile."),
                                          self.search)
+
+    def _make_view(self, scheme: Scheme) -> None:
+        """The picture of the camera that is looked at, its name and mode."""
         self.picture = PictureView("", scheme)
         self.name_field = QLineEdit()
         self.name_field.setMaxLength(_NAME_CHARACTERS)
@@ -125,6 +141,9 @@ class CamerasDialog(QDialog):
         for box in (self.turned_box, self.mirrored_box):
             box.clicked.connect(self._orient)
         self.rate = Sentence(2)
+
+    def _make_questions(self) -> None:
+        """Which hand, and whether to open."""
         self.hand_box = QComboBox()
         self.hand_box.addItem(tr("the right hand"), "right")
         self.hand_box.addItem(tr("the left hand"), "left")
@@ -138,24 +157,11 @@ class CamerasDialog(QDialog):
         self.open_button.setDefault(True)
         self.open_button.setToolTip(tr("Possible once a camera is ticked."))
         self.open_button.clicked.connect(self.open_cameras)
-        self._lay_out(intro)
-        self.resize(*_SIZE_PX)
-        self._timer = QTimer(self, interval=TICK_MS)
-        self._timer.timeout.connect(self.tick)
-        self._timer.start()
-        self.finished.connect(lambda code: self._end())
-        self._look(-1)
-        self._show_whether_ready()
-        self.search()
 
-    def _button(self, text: str, meaning: str, clicked: Callable[[], None]) -> QPushButton:
-        button = QPushButton(text)
-        button.setAutoDefault(False)
-        button.setToolTip(meaning)
-        button.clicked.connect(lambda: clicked())
-        return button
-
-    def _lay_out(self, intro: QLabel) -> None:
+    def _lay_out(self) -> None:
+        intro = QLabel(tr("Tick one camera or more, and look at each. The first one tracks alone until the others are "
+                          "put together with it."))
+        intro.setWordWrap(True)
         left, right = QVBoxLayout(), QVBoxLayout()
         add, row, turn, bottom = QHBoxLayout(), QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
         left.addWidget(self.list, 1)

@@ -103,7 +103,7 @@ class Dialogs:
             return
         if self.tracker is None:
             path = Path(opened.rig_path) if opened.rig_path else None
-            dialog = TrackerDialog(opened.rig, path, controller.backend.asker,
+            dialog = TrackerDialog(opened.rig, path, controller.backend.command_client,
                                    lambda: controller.live.state if controller.running else None, self._parent)
             dialog.rig_used.connect(lambda rig: rig_used())
             self._hold("tracker", dialog)
@@ -122,7 +122,7 @@ class Dialogs:
         if opened is None:
             return
         if self.outputs is None:
-            dialog = OutputsDialog(opened, controller.backend.asker, lambda: controller.live.status, scheme,
+            dialog = OutputsDialog(opened, controller.backend.command_client, lambda: controller.live.status, scheme,
                                    self._parent)
             dialog.addActions(actions)
             dialog.rig_used.connect(lambda rig: rig_used())

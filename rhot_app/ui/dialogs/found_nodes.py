@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from rhot_app.progress import Progress
 from rhot_app.sources.discovery import FoundNode, Search
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.language import tr, tr_noop
@@ -56,9 +57,7 @@ class FoundNodes(QWidget):
         self.table.setMinimumHeight(140)
         self.table.chosen_changed.connect(self._show_whether_chosen)
         self.side_buttons = [self._side_button(number, side) for number, side in enumerate(sides)]
-        self.again = QPushButton(tr("Search again"))
-        self.again.setAutoDefault(False)
-        self.again.clicked.connect(self.search)
+        self.again = plain_button(tr("Search again"), clicked=self.search)
         self.progress_bar = QProgressBar()
         self.progress_bar.setRange(0, 100)
         self.progress_bar.setTextVisible(False)
@@ -94,8 +93,7 @@ class FoundNodes(QWidget):
             self._job = None
 
     def _side_button(self, number: int, side: str) -> QPushButton:
-        button = QPushButton(tr("Use as {side} camera", side=tr(side)))
-        button.setAutoDefault(False)
+        button = plain_button(tr("Use as {side} camera", side=tr(side)))
         button.setEnabled(False)
         button.setToolTip(tr("Possible once a node is selected in the list."))
         button.clicked.connect(lambda: self.chosen.emit(number, self.table.chosen))

@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QButtonGroup,
     QCheckBox,
-    QFileDialog,
     QGridLayout,
     QHBoxLayout,
     QPushButton,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import ask_where_to_save
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import ShapeMark
@@ -180,10 +180,9 @@ class NextSteps(QWidget):
             self.asked.emit(action)
 
     def _choose_board(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, tr("Write the board"), str(Path.home() / "board.pdf"),
-                                              tr("PDF (*.pdf)"))
-        if name and self._job is None:
-            self._job = Job(lambda progress: _write_board(Path(name)), self._printed, self._refused, None, self).start()
+        path = ask_where_to_save(self, tr("Write the board"), Path.home() / "board.pdf", tr("PDF (*.pdf)"))
+        if path is not None and self._job is None:
+            self._job = Job(lambda progress: _write_board(path), self._printed, self._refused, None, self).start()
 
     def _printed(self, path: Path) -> None:
         self._job = None

@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QDialog,
-    QFileDialog,
     QGridLayout,
     QHBoxLayout,
     QLabel,
@@ -26,6 +25,7 @@ from rhot_app.sources.discovery import FoundNode
 from rhot_app.sources.pairing import NodeAddress
 from rhot_app.ui.backend.ping import NodeAnswer, ask_nodes, first_rig, look_for_nodes, pair_node
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import ask_where_to_save
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.dialogs.found_nodes import Find, FoundNodes
@@ -221,17 +221,20 @@ class NodesDialog(QDialog):
         self.verdict.setText(sentence)
 
     def _choose_file(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(self, tr("Write the rig file"), str(Path.home() / "rig.json"),
-                                              tr("Rig files (*.json)"))
-        if name:
-            self.write(Path(name))
+        path = ask_where_to_save(self, tr("Write the rig file"), Path.home() / "rig.json", tr("Rig files (*.json)"))
+        if path is not None:
+            self.write(path)
 
     def write(self, path: Path) -> None:
         """Write the rig and accept; a failure is shown and nothing is half-written."""
         try:
             save_rig(path, first_rig(self._answers))
-        except (RhotError, OSError) as exc:
+        except RhotError as exc:
             self.verdict.setText(str(exc))
+            return
+        except OSError as exc:
+            self.verdict.setText(tr("{out}: cannot be written ({strerror}); nothing was saved.", out=path,
+                                    strerror=exc.strerror))
             return
         self.rig_path = path
         self.accept()

@@ -27,7 +27,7 @@ from rhot_app.errors import OutputError
 from rhot_app.outputs.outputs import output_plugins
 from rhot_app.outputs.spec import OPENXR_ONLY
 from rhot_app.project import OutputSettings, Rig
-from rhot_app.ui.backend.contract import Asker, Opened
+from rhot_app.ui.backend.contract import Connect, Opened
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.output_card import OutputCard
@@ -62,7 +62,7 @@ class OutputsDialog(QDialog):
 
     rig_used = Signal(object)
 
-    def __init__(self, opened: Opened, connect: Callable[[], Asker], status: Callable[[], EngineStatus | None],
+    def __init__(self, opened: Opened, connect: Connect, status: Callable[[], EngineStatus | None],
                  scheme: Callable[[], Scheme], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle(tr("Outputs"))
@@ -201,8 +201,8 @@ class OutputsDialog(QDialog):
             return
 
         def work() -> tuple[tuple[OutputSettings, ...], Rig]:
-            with contextlib.closing(self._connect()) as asker:
-                return change_outputs(asker.command, edit)
+            with contextlib.closing(self._connect()) as client:
+                return change_outputs(client.command, edit)
 
         def done(result: tuple[tuple[OutputSettings, ...], Rig]) -> None:
             before, rig = result

@@ -18,13 +18,13 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QKeySequenceEdit,
     QLabel,
-    QPushButton,
     QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
 from rhot_app.ui.common.keys import ActionKeys, title_of
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.settings import STARTS, Settings
@@ -51,10 +51,10 @@ class SettingsDialog(QDialog):
         self.keys = KeysPage(actions)
         self.tabs.addTab(self.general, tr("General"))
         self.tabs.addTab(self.keys, tr("Keys"))
-        self.reset_button = _button(tr("Reset all"), tr("Forget layout, last rig, switches, folders and keys."))
+        self.reset_button = plain_button(tr("Reset all"), tr("Forget layout, last rig, switches, folders and keys."))
         self.reset_button.clicked.connect(actions.named("reset").trigger)
         self.reset_button.clicked.connect(self.refresh)
-        self.close_button = _button(tr("Close"), tr("Every change holds already."))
+        self.close_button = plain_button(tr("Close"), tr("Every change holds already."))
         self.close_button.clicked.connect(self.close)
         self.file_label = where = QLabel(str(settings.path))
         where.setToolTip(tr("The file in which the app remembers all this."))
@@ -174,8 +174,8 @@ class FolderRow(QWidget):
         self._meaning = meaning
         self.label = QLabel()
         self.label.setWordWrap(True)
-        self.choose_button = _button(tr("Choose …"), tr("Another folder."))
-        self.own_button = _button(tr("As at first"), tr("The folder that it was on the first start."))
+        self.choose_button = plain_button(tr("Choose …"), tr("Another folder."))
+        self.own_button = plain_button(tr("As at first"), tr("The folder that it was on the first start."))
         self.choose_button.clicked.connect(self._choose)
         self.own_button.clicked.connect(lambda: self.chosen.emit(None))
         layout = QHBoxLayout(self)
@@ -215,7 +215,7 @@ class KeysPage(QWidget):
         self.edit.setClearButtonEnabled(True)
         self.edit.setToolTip(tr("Press the new key here; the cross takes the key away."))
         self.edit.setAccessibleName(tr("Key"))
-        self.own_button = _button(tr("As at first"), tr("The key that the action had on the first start."))
+        self.own_button = plain_button(tr("As at first"), tr("The key that the action had on the first start."))
         self.sentence = Sentence(2)
         self.table.chosen_changed.connect(self._show_chosen)
         self.edit.editingFinished.connect(self._choose)
@@ -271,10 +271,3 @@ def _switch(action: QAction) -> QCheckBox:
     box.toggled.connect(action.setChecked)
     action.toggled.connect(box.setChecked)
     return box
-
-
-def _button(text: str, meaning: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(meaning)
-    button.setAutoDefault(False)
-    return button

@@ -29,7 +29,7 @@ from rhot_app.hand.anthropometry import scaled_hand
 from rhot_app.mouse.model import LOCKED_DEG, table_plane, with_mouse_model
 from rhot_app.project import TRACKER_KINDS, Rig, TrackerKind, TrackerSettings, estimator_obstacle, observation_obstacle
 from rhot_app.state import HandState
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import CommandClient, Connect
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.language import tr
@@ -59,7 +59,7 @@ class TrackerDialog(QDialog):
 
     rig_used = Signal(object)
 
-    def __init__(self, rig: Rig, path: Path | None, connect: Callable[[], Asker], hand: Callable[[], HandState | None],
+    def __init__(self, rig: Rig, path: Path | None, connect: Connect, hand: Callable[[], HandState | None],
                  parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle(tr("Tracker"))
@@ -213,17 +213,17 @@ class TrackerDialog(QDialog):
         """Take the last change back."""
         if self._job is None and self._made:
             change = self._made[-1]
-            self._start(change.before, lambda asker: change.restore(asker.command), lambda: self._undone(change))
+            self._start(change.before, lambda client: change.restore(client.command), lambda: self._undone(change))
 
     def _change(self, rig: Rig, reason: str) -> None:
         if self._job is None:
             change = RigChange(self._rig, rig, self._path, reason)
-            self._start(rig, lambda asker: change.use(asker.command), lambda: self._done(change))
+            self._start(rig, lambda client: change.use(client.command), lambda: self._done(change))
 
-    def _start(self, rig: Rig, work: Callable[[Asker], None], done: Callable[[], None]) -> None:
+    def _start(self, rig: Rig, work: Callable[[CommandClient], None], done: Callable[[], None]) -> None:
         def with_engine() -> None:
-            with contextlib.closing(self._connect()) as asker:
-                work(asker)
+            with contextlib.closing(self._connect()) as client:
+                work(client)
 
         self.sentence.setText(progress_text(rig))
         self._job = Job(lambda progress: with_engine(), lambda _: done(), self._failed, None, self).start()

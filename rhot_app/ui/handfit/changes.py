@@ -6,13 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from rhot_app.errors import CalibrationError
 from rhot_app.hand.anatomy import HandAnatomy, save_hand
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.state import FitState
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.parts import ask_where_to_save
 from rhot_app.ui.handfit.frame import Kept
 from rhot_app.ui.language import tr
 from rhot_app.ui.wizards.framework.definition import SettingsStore
@@ -167,11 +168,10 @@ class Changes(QObject):
             return
         out = self._kept.out
         if out is None:
-            start = str(Path(self._memory.remembered(FOLDER_KEY) or str(Path.home())) / "hand.json")
-            name, _ = QFileDialog.getSaveFileName(self._window, tr("Save the hand"), start, tr("Hand files (*.json)"))
-            if not name:
+            start = Path(self._memory.remembered(FOLDER_KEY) or str(Path.home())) / "hand.json"
+            out = ask_where_to_save(self._window, tr("Save the hand"), start, tr("Hand files (*.json)"))
+            if out is None:
                 return
-            out = Path(name)
         try:
             save_hand(out, self.named_hand)
         except OSError as exc:

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.handfit.session import HandFit
 from rhot_app.handfit.solve import Freedom
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.handfit.number_form import NumberForm
 from rhot_app.ui.handfit.picture import FitPicture
@@ -50,19 +50,19 @@ class FitFrame:
         self.views = [FitPicture(name, (camera.width, camera.height), scheme)
                       for name, camera in zip(fit.names, fit.cameras, strict=True)]
         self.form = NumberForm(fit.numbers)
-        self.take_button = _button(tr("Take pictures"), tr("The pictures of all cameras now, as one more instant "
-                                                           "(Space). Hold the hand still."))
-        self.open_button = _button(tr("Open pictures …"), tr("Picture or video files of one instant, one for each "
-                                                             "camera. They are told apart by the cameras' names in "
-                                                             "theirs, or sorted (Ctrl+O)."))
-        self.find_button = _button(tr("Find the hand"), tr("Look for the hand by the landmark networks (rhot landmarks "
-                                                           "install), and put all its joints there."))
+        self.take_button = plain_button(tr("Take pictures"), tr("The pictures of all cameras now, as one more instant "
+                                                                "(Space). Hold the hand still."))
+        self.open_button = plain_button(tr("Open pictures …"), tr("Picture or video files of one instant, one for each "
+                                                                  "camera. They are told apart by the cameras' names "
+                                                                  "in theirs, or sorted (Ctrl+O)."))
+        self.find_button = plain_button(tr("Find the hand"), tr("Look for the hand by the landmark networks (rhot "
+                                                                "landmarks install), and put all its joints there."))
         self.instant_box = QComboBox()
         self.instant_box.setToolTip(tr("Which pictures are shown. All instants share the lengths; each has its own "
                                        "pose."))
         self.instant_box.setAccessibleName(tr("Instant"))
-        self.remove_button = _button(tr("Remove"), tr("Remove the instant shown; undo brings it back."))
-        self.undo_button, self.redo_button = _button(tr("Undo"), ""), _button(tr("Redo"), "")
+        self.remove_button = plain_button(tr("Remove"), tr("Remove the instant shown; undo brings it back."))
+        self.undo_button, self.redo_button = plain_button(tr("Undo"), ""), plain_button(tr("Redo"), "")
         self.freedom_box = QComboBox()
         self.freedom_box.setAccessibleName(tr("What a drag or a fit may change"))
         self.freedom_box.setToolTip(tr("What a drag or a fit may change. Begin with the pose; free lengths when the "
@@ -78,19 +78,20 @@ class FitFrame:
         self.sd_box.setAccessibleName(tr("Standard deviation of an anchor"))
         self.sd_box.setToolTip(tr("How exactly you can point at a joint in these pictures. The standard deviations and "
                                   "Fit to anchors go by it; a drag meets the pointer whatever it is."))
-        self.anchors_button = _button(tr("Fit to anchors"),
-                                      tr("The most probable hand by all anchors at once (Ctrl+Return)."))
-        self.contours_button = _button(tr("Fit to contours"), tr("Search the edges of the hand in the pictures, from "
-                                                                 "where it is now, and fit it to them "
-                                                                 "(Ctrl+Shift+Return)."))
-        self.free_button = _button(tr("Free all joints"), tr("Remove all anchors of this instant."))
-        self.reset_button = _button(tr("Reset"),
-                                    tr("Back to the hand and the poses of the beginning; undo brings everything back."))
-        self.save_button = _button(tr("Save hand file …"), tr("Write the hand as a hand file (Ctrl+S)."))
-        self.use_button = _button(tr("Use this hand"), tr("Put the hand into the rig. The rig file keeps what it had; "
-                                                          "Calibrate, Bring back an earlier calibration restores it."))
-        self.close_button, self.cancel_button = _button(tr("Close"), tr("Escape.")), _button(tr("Cancel"),
-                                                                                             tr("Give the search up."))
+        self.anchors_button = plain_button(tr("Fit to anchors"), tr("The most probable hand by all anchors at once "
+                                                                    "(Ctrl+Return)."))
+        self.contours_button = plain_button(tr("Fit to contours"), tr("Search the edges of the hand in the pictures, "
+                                                                      "from where it is now, and fit it to them "
+                                                                      "(Ctrl+Shift+Return)."))
+        self.free_button = plain_button(tr("Free all joints"), tr("Remove all anchors of this instant."))
+        self.reset_button = plain_button(tr("Reset"), tr("Back to the hand and the poses of the beginning; undo brings "
+                                                         "everything back."))
+        self.save_button = plain_button(tr("Save hand file …"), tr("Write the hand as a hand file (Ctrl+S)."))
+        self.use_button = plain_button(tr("Use this hand"), tr("Put the hand into the rig. The rig file keeps what it "
+                                                               "had; Calibrate, Bring back an earlier calibration "
+                                                               "restores it."))
+        self.close_button = plain_button(tr("Close"), tr("Escape."))
+        self.cancel_button = plain_button(tr("Cancel"), tr("Give the search up."))
         self.errors = QLabel()
         self.sentence = Sentence(2)
         self.take_button.setVisible(live)
@@ -170,10 +171,3 @@ class FitFrame:
         forward = tr("Brings back: {change}.", change=tr(forward)) if forward else tr("Nothing to redo.")
         self.undo_button.setToolTip(f"Ctrl+Z. {back}")
         self.redo_button.setToolTip(f"Ctrl+Shift+Z. {forward}")
-
-
-def _button(title: str, meaning: str) -> QPushButton:
-    button = QPushButton(title)
-    button.setToolTip(meaning)
-    button.setAutoDefault(False)
-    return button

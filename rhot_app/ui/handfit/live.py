@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import HandPose
 from rhot_app.handfit.session import HandFit
-from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.backend.contract import Connect, Listener
 from rhot_app.ui.backend.feed import LiveFeed, StateFeed
 from rhot_app.ui.handfit.frame import Kept
 from rhot_app.ui.handfit.instants import LiveCameras
@@ -26,7 +26,7 @@ RECENT_S = 0.5
 """s: a pose that was tracked so lately is where a hand held still is now."""
 
 
-def fit_live(fit: HandFit, path: Path | None, connect: Callable[[], Asker], listen: Callable[[], Listener],
+def fit_live(fit: HandFit, path: Path | None, connect: Connect, listen: Callable[[], Listener],
              scheme: Scheme, memory: SettingsStore, parent: QWidget | None) -> HandFitWindow:
     """The window of `fit` on the engine's rig, whose file is at `path`; None: it came from no file."""
     nodes = [node for node in fit.rig.nodes if not node.text_datagrams]
@@ -41,8 +41,8 @@ def fit_live(fit: HandFit, path: Path | None, connect: Callable[[], Asker], list
 
     def use(hand: HandAnatomy) -> None:
         """The hand into the engine's rig and its file, which keeps what it had."""
-        with contextlib.closing(connect()) as asker:
-            RigChange(fit.rig, msgspec.structs.replace(fit.rig, hand=hand), path, REASON).use(asker.command)
+        with contextlib.closing(connect()) as client:
+            RigChange(fit.rig, msgspec.structs.replace(fit.rig, hand=hand), path, REASON).use(client.command)
         fit.rig = msgspec.structs.replace(fit.rig, hand=hand)
 
     def stop() -> None:

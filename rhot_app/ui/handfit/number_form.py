@@ -39,7 +39,8 @@ class NumberRow(QWidget):
         super().__init__(parent)
         self.number = number
         self._filling = self._moving = False
-        name = QLabel(number.name)
+        group, title = tr(number.group), tr(number.name)
+        name = QLabel(title)
         self.box = _Box()
         most = _MOST_MM.get(number.kind)
         self.box.setRange(*((number.low, number.high) if most is None else (-most, most)))
@@ -54,9 +55,9 @@ class NumberRow(QWidget):
         self.spread.setToolTip(tr("Standard deviation in the unit beside, by the anchors and what is known of people's "
                                   "hands; after Fit to contours by the contours, too."))
         for part in (name, self.box, self.slider):
-            part.setToolTip(number.meaning)
-        self.box.setAccessibleName(f"{tr(number.group)}, {number.name}")
-        self.slider.setAccessibleName(tr("{group}, {name}, slider", group=tr(number.group), name=number.name))
+            part.setToolTip(tr(number.meaning))
+        self.box.setAccessibleName(f"{group}, {title}")
+        self.slider.setAccessibleName(tr("{group}, {name}, slider", group=group, name=title))
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(0)

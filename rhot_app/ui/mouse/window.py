@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from rhot_app.engine.status import EngineStatus
 from rhot_app.errors import RhotError
@@ -19,6 +19,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Listener
 from rhot_app.ui.backend.live import SILENCE_S
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.common.theme import app_font
@@ -68,12 +69,11 @@ class MouseWindow(ToolWindow):
         self.tick()
 
     def _make_parts(self, scheme: Scheme) -> None:
-        self.rest_button = _button(tr("Rest here"),
-                                   tr("The hand as it lies for the next half second becomes the cursor's origin (H)."),
-                                   self.take_rest)
-        self.undo_button = _button(tr("Undo"), tr("Take the last move of a ball back (Ctrl+Z)."), self.undo)
-        self.test_button = _button(tr("Target test"), tr("Click nine targets with the thumb: how many bits per second "
-                                                         "the hand conveys (T)."), self.begin_or_end_test)
+        self.rest_button = plain_button(tr("Rest here"), tr("The hand as it lies for the next half second becomes the "
+                                                            "cursor's origin (H)."), self.take_rest)
+        self.undo_button = plain_button(tr("Undo"), tr("Take the last move of a ball back (Ctrl+Z)."), self.undo)
+        self.test_button = plain_button(tr("Target test"), tr("Click nine targets with the thumb: how many bits per "
+                                                              "second the hand conveys (T)."), self.begin_or_end_test)
         self.height_box = QComboBox()
         self.height_box.setToolTip(tr("What sets the pole's length: the index fingertip above the palm, or the palm."))
         self.height_box.setAccessibleName(tr("Height from"))
@@ -223,11 +223,3 @@ class MouseWindow(ToolWindow):
     def stop(self) -> None:
         """Listening."""
         self._listener.close()
-
-
-def _button(title: str, meaning: str, action: Callable[[], None]) -> QPushButton:
-    button = QPushButton(title)
-    button.setToolTip(meaning)
-    button.setAutoDefault(False)
-    button.clicked.connect(lambda checked=False: action())
-    return button

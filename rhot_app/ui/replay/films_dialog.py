@@ -30,6 +30,7 @@ from rhot_app.project import Rig, load_rig
 from rhot_app.sources.film_offset import FilmOffset, offsets_of
 from rhot_app.ui.backend.solver import Solver, StoppedError
 from rhot_app.ui.common.job import CancelledError, Job, Progress
+from rhot_app.ui.common.parts import ask_where_to_save
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import LOG_FILTER
@@ -281,10 +282,10 @@ class FilmsDialog(QDialog):
             self.cancel()
             return
         first = self.films[0].path
-        name, _ = QFileDialog.getSaveFileName(self, tr("Write the recording to"),
-                                              str(first.with_name(f"{first.stem}-hand.rhotlog")), tr(LOG_FILTER))
-        if name:
-            self.track(Path(name))
+        log = ask_where_to_save(self, tr("Write the recording to"), first.with_name(f"{first.stem}-hand.rhotlog"),
+                                tr(LOG_FILTER))
+        if log is not None:
+            self.track(log)
 
     def track(self, log: Path) -> None:
         """Track the films in another process; `tracked` follows when the log is whole."""

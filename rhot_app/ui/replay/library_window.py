@@ -12,7 +12,7 @@ import msgspec
 from platformdirs import user_cache_path
 from PySide6.QtCore import QEvent, QSize, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices, QKeySequence, QShortcut
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from rhot_app.errors import RhotError
 from rhot_app.keys import load_master_keys
@@ -21,6 +21,7 @@ from rhot_app.recording.raw_log import LogReader
 from rhot_app.recording.video import Collected, collect_videos
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.job import Job, Progress
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.tool_window import ToolWindow
 from rhot_app.ui.language import tr
@@ -59,16 +60,16 @@ class LibraryWindow(ToolWindow):
         self.empty = EmptyState(tr("No recordings yet. Press Record, or R, while a rig is open."))
         self.table = RecordingTable(scheme)
         self.sentence = Sentence(2)
-        self.open_button = _button(tr("Open"), tr("Track the recording and play it (Enter)."))
-        self.rename_button = _button(tr("Rename"), tr("Call the recording something else (F2)."))
-        self.delete_button = _button(tr("Delete"), tr("Delete the recording; Undo brings it back until this page is "
-                                                      "closed (Delete)."))
-        self.undo_button = _button(tr("Undo"), tr("Bring back the recording that was deleted last (Ctrl+Z)."))
-        self.video_button = _button(tr("Collect video"), tr("Fetch the frames that the cameras recorded beside the "
-                                                            "recording; they come to lie beside it."))
+        self.open_button = plain_button(tr("Open"), tr("Track the recording and play it (Enter)."))
+        self.rename_button = plain_button(tr("Rename"), tr("Call the recording something else (F2)."))
+        self.delete_button = plain_button(tr("Delete"), tr("Delete the recording; Undo brings it back until this page "
+                                                           "is closed (Delete)."))
+        self.undo_button = plain_button(tr("Undo"), tr("Bring back the recording that was deleted last (Ctrl+Z)."))
+        self.video_button = plain_button(tr("Collect video"), tr("Fetch the frames that the cameras recorded beside "
+                                                                 "the recording; they come to lie beside it."))
         self.strip = WorkStrip()
-        self.folder_button = _button(tr("Open folder"), tr("Show the recordings in the desktop's file manager."))
-        self.close_button = _button(tr("Close"), tr("Close this page. What was deleted is then gone for good."))
+        self.folder_button = plain_button(tr("Open folder"), tr("Show the recordings in the desktop's file manager."))
+        self.close_button = plain_button(tr("Close"), tr("Close this page. What was deleted is then gone for good."))
         self._lay_out()
         self._connect()
         self._show_choice()
@@ -275,10 +276,3 @@ def _collect(log: Path, rig: Rig | None, progress: Progress) -> list[Collected]:
     nodes = tuple(msgspec.structs.replace(now.get(node.node_id, node), name=node.name) for node in recorded.nodes)
     return collect_videos(log, msgspec.structs.replace(recorded, nodes=nodes), load_master_keys().own,
                           progress=progress.report)
-
-
-def _button(text: str, meaning: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(meaning)
-    button.setAutoDefault(False)
-    return button

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QSpli
 
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.state import Condition, HandState
-from rhot_app.ui.common.scrolled import scrolled
+from rhot_app.ui.common.parts import scrolled
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.shapes import shape_icon
 from rhot_app.ui.language import tr, tr_noop

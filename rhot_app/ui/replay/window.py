@@ -22,6 +22,7 @@ from rhot_app.recording.bookmarks import Bookmark
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import ask_where_to_save
 from rhot_app.ui.common.settings import Settings
 from rhot_app.ui.common.tool_window import AS_MAIN, WindowTools
 from rhot_app.ui.dialogs.export_dialog import ExportDialog
@@ -228,10 +229,10 @@ class ReplayWindow(QMainWindow):
             self.tell("info", tr("Choose the part first: [ and ] set where the repeated range begins and ends."))
             return
         log = self.replay.path
-        start = str(log.with_stem(f"{log.stem}-part"))
-        name, _ = QFileDialog.getSaveFileName(self, tr("Save the repeated range as"), start, tr(LOG_FILTER))
-        if name:
-            self.trim(Path(name), *loop)
+        out = ask_where_to_save(self, tr("Save the repeated range as"), log.with_stem(f"{log.stem}-part"),
+                                tr(LOG_FILTER))
+        if out is not None:
+            self.trim(out, *loop)
 
     def trim(self, out: Path, begin_s: float, end_s: float) -> None:
         """Save a range of positions as a recording of its own, in a worker; what stands there is written over."""

@@ -17,7 +17,7 @@ To add one:
    write ``rhot_app/ui/wizards/NAME.py`` with ``make_wizard(context)``, which gives a
    `framework.definition.Definition` of the steps and pages that are its own;
 4. a command's word is one of its title, and its help ends with two examples: kinds/depth.py shows one in full;
-5. test it as a person would: in tests/ui/wizards, `Hands` clicks and `FakeRigAsker` draws pictures. Run it once in
+5. test it as a person would: in tests/ui/wizards, `Hands` clicks and `FakeRigClient` draws pictures. Run it once in
    tests/ui/wizards/on_simulated_rig, as a study with its row in CONTRIBUTING.md. ``hands.keep(NAME)`` takes a page's
    picture for the guide where RHOT_UPDATE_SCREENSHOTS is 1: open it.
 

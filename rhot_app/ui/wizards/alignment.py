@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit, QPushButton
+from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QLineEdit
 
 from rhot_app.calibration.collect import Bar, Movement
 from rhot_app.calibration.kinds.alignment import StreamRecording
@@ -23,6 +23,7 @@ from rhot_app.state import HandState
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.backend.pose_feed import PoseFeed
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import Definition, SettingsStore, WizardContext, accept_result
@@ -268,9 +269,7 @@ class SourcePage(Page):
         self.tracker.setPlaceholderText(tr("the only one"))
         self.tracker.setToolTip(tr("Serial number, name or role. Empty: the only one."))
         self.meaning = Sentence(2, muted=True)
-        self.connect_button = QPushButton(tr("Connect"))
-        self.connect_button.setAutoDefault(False)
-        self.connect_button.clicked.connect(self._connect)
+        self.connect_button = plain_button(tr("Connect"), clicked=self._connect)
         self.heard = QLabel()
         self.heard.setWordWrap(True)
         self.form = QFormLayout()
@@ -348,6 +347,6 @@ class TogetherPage(MovementPage):
         self.changed.emit()
 
     def _start_tracking(self) -> None:
-        with contextlib.closing(self._connect()) as asker:
-            if not asker.command("hello").get("running", True):
-                asker.command("start")
+        with contextlib.closing(self._connect()) as client:
+            if not client.command("hello").get("running", True):
+                client.command("start")

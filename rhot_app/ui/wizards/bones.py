@@ -10,11 +10,11 @@ import msgspec
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QBrush, QColor
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QWidget
 
 from rhot_app.calibration.collect import Bar, Guide, Movement
 from rhot_app.calibration.hand.bones import BONE_NAMES, enter_bones
-from rhot_app.calibration.hand.bones_report import BoneLength, BonesReport
+from rhot_app.calibration.hand.bones_result import BoneLength, BonesResult
 from rhot_app.calibration.hand.marker_places import tracks_of
 from rhot_app.calibration.kinds.bones import roles_of
 from rhot_app.errors import CalibrationError
@@ -22,6 +22,7 @@ from rhot_app.hand.anatomy import HandAnatomy
 from rhot_app.hand.skeleton import BONES, FINGERS
 from rhot_app.project import Rig
 from rhot_app.state import HandState
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.record_table import RecordTable
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
@@ -71,7 +72,7 @@ class EntryStep(Step):
         self._lengths: dict[str, float] = {}
         self._side: Side = hand.side
         self._undone: list[tuple[dict[str, float], Side]] = []
-        self.result: BonesReport | None = None
+        self.result: BonesResult | None = None
         self.problem = ""
 
     @property
@@ -232,10 +233,7 @@ class EntryPage(Page):
             self.side.addItem(tr(text), value)
         self.side.setToolTip(tr("Which hand wears the markers."))
         self.boxes = {name: self._box(name) for name in BONE_NAMES}
-        self.undo_button = QPushButton(tr("Undo"))
-        self.undo_button.setAutoDefault(False)
-        self.undo_button.setToolTip(tr("Ctrl+Z. What was entered last."))
-        self.undo_button.clicked.connect(self._undo)
+        self.undo_button = plain_button(tr("Undo"), tr("Ctrl+Z. What was entered last."), self._undo)
         self.centre = self._form()
         note = QLabel(tr("Most people leave this page as it is: a minute of movement shows the lengths, and how well. "
                          "A ruler helps where too few markers are worn."))
@@ -311,7 +309,7 @@ class HandPage(Page):
         super().__init__(step)
         self._hand = step
         self._scheme = scheme
-        self._shown: BonesReport | None = None
+        self._shown: BonesResult | None = None
         self.table: RecordTable[tuple[str, ...]] = RecordTable((), selectable=False)
         self.table.setShowGrid(False)
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
@@ -329,7 +327,7 @@ class HandPage(Page):
 
     def show_view(self, view: StepView) -> None:
         """The newest result."""
-        result: BonesReport | None = self._hand.result
+        result: BonesResult | None = self._hand.result
         if result is self._shown:
             return
         self._shown = result

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from rhot_app.calibration.check.camera_advice import CameraAdvice, CameraAdvisor
 from rhot_app.calibration.check.exposure import BRIGHT, DARK
@@ -22,9 +22,10 @@ from rhot_app.calibration.proposal import NodeChange, Proposal, Row
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError, RhotError
 from rhot_app.project import RigNode
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import CommandClient, Connect
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.control_row import Control, ControlRow, Value
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
@@ -92,15 +93,10 @@ class CameraPage(Page):
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)
         scroll.setWidget(knobs)
-        self.balance_button = QPushButton(tr("Balance on grey"))
-        self.balance_button.setToolTip(tr("Drag over something grey or white in a picture first, a sheet of paper for "
-                                          "instance. Press again until nothing changes."))
-        self.balance_button.setAutoDefault(False)
-        self.balance_button.clicked.connect(self._balance)
-        self.undo_button = QPushButton(tr("Undo"))
-        self.undo_button.setToolTip(tr("Ctrl+Z. The last change back."))
-        self.undo_button.setAutoDefault(False)
-        self.undo_button.clicked.connect(self._undo)
+        self.balance_button = plain_button(tr("Balance on grey"), tr("Drag over something grey or white in a picture "
+                                                                     "first, a sheet of paper for instance. Press "
+                                                                     "again until nothing changes."), self._balance)
+        self.undo_button = plain_button(tr("Undo"), tr("Ctrl+Z. The last change back."), self._undo)
         self.problem = QLabel()
         self.problem.setWordWrap(True)
         self.column.addWidget(self.which)
@@ -177,7 +173,7 @@ class Tryout(QObject):
 
     answered = Signal(str)
 
-    def __init__(self, connect: Callable[[], Asker], parent: QObject | None = None) -> None:
+    def __init__(self, connect: Connect, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._connect = connect
         self._wanted: dict[int, Settings] = {}
@@ -202,9 +198,9 @@ class Tryout(QObject):
             self._job = Job(lambda progress: self._send(wanted), self._sent, self._failed, None, self).start()
 
     def _send(self, wanted: dict[int, Settings]) -> None:
-        with self._lock, contextlib.closing(self._connect()) as asker:
+        with self._lock, contextlib.closing(self._connect()) as client:
             for node_id, settings in wanted.items():
-                try_settings(asker, node_id, settings)
+                try_settings(client, node_id, settings)
 
     def _sent(self, _: None) -> None:
         self._job = None
@@ -220,17 +216,17 @@ class Tryout(QObject):
         """Have every node that was told anything go by `before` again; waits, so call it in a worker. A node that does
         not answer is left: what was tried out ends with its process."""
         self._wanted = {}
-        with self._lock, contextlib.closing(self._connect()) as asker:
+        with self._lock, contextlib.closing(self._connect()) as client:
             for node_id in sorted(self._tried):
                 try:
-                    try_settings(asker, node_id, before[node_id])
+                    try_settings(client, node_id, before[node_id])
                 except RhotError:
                     continue
 
 
-def try_settings(asker: Asker, node_id: int, settings: Settings) -> None:
+def try_settings(client: CommandClient, node_id: int, settings: Settings) -> None:
     """Settings that are in force but not saved; raises EngineError with the node's sentence."""
-    asker.command("node", node_id=node_id, request={"request": "set_settings", "settings": settings, "save": False})
+    client.command("node", node_id=node_id, request={"request": "set_settings", "settings": settings, "save": False})
 
 
 # -- what is told to whom, and what the pictures say to it -------------------------------------------------------------

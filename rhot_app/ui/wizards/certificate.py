@@ -18,7 +18,7 @@ from rhot_app.certificate.collect import SECONDS
 from rhot_app.certificate.latency import flash_edges
 from rhot_app.certificate.recordings import FlashStep, PlumbStep, ProtocolFile, RodStep, RulerStep, StaticStep
 from rhot_app.project import Rig
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import Connect
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
@@ -178,7 +178,7 @@ class KeepStep(AcceptStep):
 class StillPage(MovementPage):
     """Which side of a hand it is."""
 
-    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed,
+    def __init__(self, step: CertificateStep, connect: Connect, states: StateFeed,
                  said: Statements) -> None:
         super().__init__(step, connect, states)
         self.facing = QComboBox()
@@ -194,7 +194,7 @@ class StillPage(MovementPage):
 class RulerPage(MovementPage):
     """The distance by the ruler, and the rows so far."""
 
-    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed,
+    def __init__(self, step: CertificateStep, connect: Connect, states: StateFeed,
                  ids: tuple[str, ...]) -> None:
         super().__init__(step, connect, states)
         assert isinstance(step, RulerDistances)
@@ -225,7 +225,7 @@ class RulerPage(MovementPage):
 class RodPage(MovementPage):
     """The rod's length and its markers."""
 
-    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed,
+    def __init__(self, step: CertificateStep, connect: Connect, states: StateFeed,
                  said: Statements) -> None:
         super().__init__(step, connect, states)
         ids = said.rig.markers.ids
@@ -248,7 +248,7 @@ class RodPage(MovementPage):
 class FlashPage(MovementPage):
     """A patch in a marker's colour in the middle of the window; it flashes while it is recorded."""
 
-    def __init__(self, step: CertificateStep, connect: Callable[[], Asker], states: StateFeed, said: Statements,
+    def __init__(self, step: CertificateStep, connect: Connect, states: StateFeed, said: Statements,
                  clock: Callable[[], int] = time.monotonic_ns) -> None:
         super().__init__(step, connect, states)
         self.clock = clock

@@ -7,14 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QHeaderView, QLabel, QPushButton
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QHeaderView, QLabel
 
-from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthReport, fit_depth, geometry_of, replaced_calibration
+from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthResult, fit_depth, geometry_of, replaced_calibration
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
 from rhot_app.errors import CalibrationError, EngineError
 from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.feed import Picture, StateFeed
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
@@ -61,7 +62,7 @@ class DistanceStep(Step):
         self.marker = 0
         self.distance_m = 0.3
         self.rows: list[DepthRow] = []
-        self.result: DepthReport | None = None
+        self.result: DepthResult | None = None
         self.problem = ""
         self._recent = recent
         self._detectors: dict[str, FastDetector] = {}
@@ -193,10 +194,8 @@ class DistancePage(Page):
         self.distance.setToolTip(tr("From the middle between both lenses straight to the marker, by a tape measure."))
         self.distance.valueChanged.connect(self._enter)
         self.seen = QLabel()
-        self.take_button = QPushButton(tr("Take this distance"))
-        self.take_button.setAutoDefault(False)
-        self.take_button.setToolTip(tr("Space. Takes the disparity that both cameras have seen in the last second."))
-        self.take_button.clicked.connect(self._take)
+        self.take_button = plain_button(tr("Take this distance"), tr("Space. Takes the disparity that both cameras "
+                                                                     "have seen in the last second."), self._take)
         form = QFormLayout()
         form.addRow(tr("Marker"), self.marker)
         form.addRow(tr("Distance"), self.distance)
@@ -204,9 +203,7 @@ class DistancePage(Page):
         self.table = RecordTable(_columns())
         self.table.setToolTip(tr("Distance, mean disparity and its spread within the second."))
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.remove_button = QPushButton(tr("Remove the chosen row"))
-        self.remove_button.setAutoDefault(False)
-        self.remove_button.clicked.connect(self._remove)
+        self.remove_button = plain_button(tr("Remove the chosen row"), clicked=self._remove)
         self.table.chosen_changed.connect(self._show_removable)
         self.column.addLayout(form)
         self.column.addWidget(self.take_button)

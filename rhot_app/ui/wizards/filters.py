@@ -14,11 +14,11 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QFormLayout,
 
 from rhot_app.calibration.collect import Bar, Movement
 from rhot_app.calibration.filters.meters import BRISK_M_S, MOVING_M_S, FilterMeter, FilterTargets, MeterReading
-from rhot_app.calibration.filters.tuning import FilterReport
+from rhot_app.calibration.filters.tuning import FilterResult
 from rhot_app.calibration.kinds.filters import FilterStage, report
 from rhot_app.calibration.report import Report
 from rhot_app.state import HandState
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import Connect
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.language import tr, tr_noop
@@ -64,7 +64,7 @@ class TuneStep(SolveStep):
         still, fast = self._logs()
         return None if still is None or fast is None else (still, fast, self.targets, False)
 
-    def describe(self, result: FilterReport) -> Report:
+    def describe(self, result: FilterResult) -> Report:
         """With the charts of one filter."""
         return report(result, self._now, self.stage)
 
@@ -84,7 +84,7 @@ class TuneStep(SolveStep):
         if self.result is not None:
             self.take_result(self.result)
 
-    def take_result(self, result: FilterReport) -> None:
+    def take_result(self, result: FilterResult) -> None:
         """As it was asked for."""
         super().take_result(replace(result, per_marker=self.per_marker))
 
@@ -254,7 +254,7 @@ _STAGES = (("position", tr_noop("after depth (positions)")), ("pixel", tr_noop("
 class MeterPage(MovementPage):
     """A recorded movement with jitter and lag of every marker, live."""
 
-    def __init__(self, step: MovementStep, connect: Callable[[], Asker], states: StateFeed, meters: LiveMeters) -> None:
+    def __init__(self, step: MovementStep, connect: Connect, states: StateFeed, meters: LiveMeters) -> None:
         super().__init__(step, connect, states)
         self._feed = states
         self._meters = meters

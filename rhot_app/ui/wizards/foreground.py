@@ -6,22 +6,22 @@ import contextlib
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QPushButton
 
 from rhot_app.calibration.kinds.wizard_only import FOREGROUND
 from rhot_app.calibration.proposal import Command, Proposal, Row
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge, told_apart, with_findings
 from rhot_app.errors import EngineError, RhotError
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import Connect
 from rhot_app.ui.backend.feed import Picture, ask_picture
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
 from rhot_app.ui.wizards.framework.drawing import Layer
@@ -45,10 +45,10 @@ def make_wizard(context: WizardContext) -> Definition:
         for step in (empty, skin):
             step.stop()
         if last.accept.state != "used" and (empty.tried or skin.tried):
-            with contextlib.closing(context.connect()) as asker:
+            with contextlib.closing(context.connect()) as client:
                 for node_id in cameras.values():
                     with contextlib.suppress(RhotError):  # a node that is gone has forgotten it anyway
-                        ask_node(asker.command, node_id, "revert_foreground")
+                        ask_node(client.command, node_id, "revert_foreground")
 
     return Definition(pages, put_back=put_back)
 
@@ -60,10 +60,8 @@ class LearnPage(Page):
         super().__init__(step)
         self._learning, self._context = step, context
         self._job: Job | None = None
-        self.learn_button = QPushButton(label)
-        self.learn_button.setAutoDefault(False)
-        self.learn_button.setToolTip(tr("Tried out at once by every node, and kept by none before the last step."))
-        self.learn_button.clicked.connect(self.learn)
+        self.learn_button = plain_button(label, tr("Tried out at once by every node, and kept by none before the last "
+                                                   "step."), self.learn)
         self.column.addWidget(self.learn_button)
         self.column.addStretch(1)
         self.first_field = self.learn_button
@@ -80,8 +78,8 @@ class LearnPage(Page):
         self.learn_button.setEnabled(self._job is None and bool(self._learning.nodes))
 
     def _ask(self) -> str:
-        with contextlib.closing(self._context.connect()) as asker:
-            return self._learning.learn(asker.command)
+        with contextlib.closing(self._context.connect()) as client:
+            return self._learning.learn(client.command)
 
     def _learnt(self, problem: str) -> None:
         self._job = None
@@ -285,7 +283,7 @@ class SkinStep(LearningStep):
     title = tr_noop("Your hand")
     watches = True
 
-    def __init__(self, cameras: Mapping[str, int], connect: Callable[[], Asker]) -> None:
+    def __init__(self, cameras: Mapping[str, int], connect: Connect) -> None:
         super().__init__(cameras)
         self.masks: dict[str, Mask] = {}
         self._connect = connect
@@ -305,11 +303,11 @@ class SkinStep(LearningStep):
     def observe(self, pictures: Pictures) -> dict[str, Mask]:
         """What each node takes for the hand now."""
         found = {}
-        with contextlib.closing(self._connect()) as asker:
+        with contextlib.closing(self._connect()) as client:
             for name in pictures:
                 if name in self.nodes:
                     with contextlib.suppress(RhotError):  # its picture says what is wrong
-                        answer = ask_node(asker.command, self.nodes[name], "foreground_mask")
+                        answer = ask_node(client.command, self.nodes[name], "foreground_mask")
                         found[name] = mask_of(name, answer)
         return found
 

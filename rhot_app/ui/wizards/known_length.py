@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout, QPushButton
+from PySide6.QtWidgets import QDoubleSpinBox, QFormLayout
 
 from rhot_app.calibration.stereo.calibrate import KnownLengths
 from rhot_app.calibration.stereo.ruler import RulerReading
 from rhot_app.simulator.scene.scene_description import RulerShow
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.drawing import Dots, Line, Overlay
 from rhot_app.ui.wizards.framework.page import Page
@@ -148,16 +149,11 @@ class LengthsPage(Page):
         form.setSpacing(8)
         form.addRow(tr("Lens to lens"), self.baseline)
         form.addRow(tr("Ruler"), self.ruler)
-        self.hold = QPushButton(tr("Hold the pictures"))
-        self.hold.setToolTip(tr("Space. Then click both ends of the ruler in each picture."))
-        self.hold.setAutoDefault(False)
-        self.hold.clicked.connect(self._hold)
+        self.hold = plain_button(tr("Hold the pictures"), tr("Space. Then click both ends of the ruler in each "
+                                                             "picture."), self._hold)
         self.column.addLayout(form)
-        self.skip = QPushButton(tr(SKIP))
-        self.skip.setToolTip(tr("If the size of the squares was typed wrong, every length is wrong by the same factor "
-                                "and nothing will tell."))
-        self.skip.setAutoDefault(False)
-        self.skip.clicked.connect(self._skip)
+        self.skip = plain_button(tr(SKIP), tr("If the size of the squares was typed wrong, every length is wrong by "
+                                              "the same factor and nothing will tell."), self._skip)
         self.column.addWidget(self.hold)
         self.column.addWidget(self.skip)
         self.column.addStretch(1)

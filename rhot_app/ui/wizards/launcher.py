@@ -19,7 +19,7 @@ from rhot_app.calibration.proposal import Proposal
 from rhot_app.calibration.registry import Calibration, InForce, calibrations
 from rhot_app.errors import EngineError
 from rhot_app.project import Rig, parse_rig
-from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.backend.contract import CommandClient, Connect, Listener
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.common.disposal import dispose
 from rhot_app.ui.common.job import Job
@@ -54,7 +54,7 @@ class Launcher(QObject):
     rig_used = Signal()
     failed = Signal(str)
 
-    def __init__(self, connect: Callable[[], Asker], listen: Callable[[], Listener], scheme: Callable[[], Scheme],
+    def __init__(self, connect: Connect, listen: Callable[[], Listener], scheme: Callable[[], Scheme],
                  memory: SettingsStore, window: QWidget, make_solver: Callable[[], Solver] = Solver) -> None:
         super().__init__(window)
         self._make_solver = make_solver
@@ -118,11 +118,11 @@ class Launcher(QObject):
     def _look(self, wizard: Calibration | None) -> InForce:
         if wizard is not None:
             importlib.import_module(module_of(wizard))  # takes a moment the first time
-        with contextlib.closing(self._connect()) as asker:
-            answer = asker.command("rig")
+        with contextlib.closing(self._connect()) as client:
+            answer = client.command("rig")
             path = str(answer.get("path", ""))
             rig = parse_rig(msgspec.json.encode(answer["document"]), path or "the engine's rig")
-            settings = _node_settings(asker, rig) if wizard is not None else {}
+            settings = _node_settings(client, rig) if wizard is not None else {}
         return InForce(rig, Path(path) if path else None, settings)
 
     def _show(self, wizard: Calibration, now: InForce) -> None:
@@ -196,13 +196,13 @@ class Launcher(QObject):
         self.failed.emit(sentence)
 
 
-def _node_settings(asker: Asker, rig: Rig) -> dict[int, dict[str, Any]]:
+def _node_settings(client: CommandClient, rig: Rig) -> dict[int, dict[str, Any]]:
     """Settings by node id; a node that does not answer is left out, its picture will say why."""
     found: dict[int, dict[str, Any]] = {}
     for node in rig.nodes:
         if not node.text_datagrams:
             try:
-                answer = asker.command("node", node_id=node.node_id, request={"request": "settings"})
+                answer = client.command("node", node_id=node.node_id, request={"request": "settings"})
                 found[node.node_id] = dict(answer["answer"]["settings"])
             except (EngineError, KeyError):
                 continue

@@ -12,7 +12,7 @@ from rhot_app.calibration.board.boards import Board, same_pattern
 from rhot_app.calibration.board.corners import BoardView
 from rhot_app.calibration.board.shared_views import BoardShot
 from rhot_app.calibration.lens.coverage import CaptureGuide, Coverage
-from rhot_app.calibration.lens.intrinsics import IntrinsicsReport
+from rhot_app.calibration.lens.intrinsics import IntrinsicsResult
 from rhot_app.project import Intrinsics
 from rhot_app.ui.backend.feed import Image, Picture
 from rhot_app.ui.language import tr, tr_noop
@@ -41,7 +41,7 @@ def make_wizard(context: WizardContext) -> Definition:
     show = LensShowStep(board)
     solve = LensSolveStep(context, show)
 
-    def chosen(result: IntrinsicsReport) -> IntrinsicsReport:
+    def chosen(result: IntrinsicsResult) -> IntrinsicsResult:
         """The next run begins with the camera after it."""
         context.memory.remember(LAST, result.camera)
         return result
@@ -212,7 +212,7 @@ class LensSolveStep(SolveStep):
     """The solve; then the picture with the residuals, or straightened by the new lens."""
 
     watches = True
-    result: IntrinsicsReport | None
+    result: IntrinsicsResult | None
 
     def __init__(self, context: WizardContext, show: LensShowStep) -> None:
         super().__init__(context.calibration, context.now,
@@ -261,7 +261,7 @@ def straightened(bgr: Image, lens: Intrinsics) -> Image:
     return np.asarray(cv2.undistort(bgr, matrix, np.array(lens.distortion)), np.uint8)
 
 
-def residual_marks(result: IntrinsicsReport) -> Overlay:
+def residual_marks(result: IntrinsicsResult) -> Overlay:
     """Where corners were, and the mean residual of each part of the picture as an arrow, exaggerated as stated."""
     field, (width, height) = result.field, result.size
     rows, cols = field.count.shape

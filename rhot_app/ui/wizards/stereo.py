@@ -13,7 +13,7 @@ from rhot_app.calibration.board.shared_views import BoardShot, SharedViews
 from rhot_app.calibration.kinds.stereo import StereoViews
 from rhot_app.calibration.stereo.calibrate import lens_of
 from rhot_app.calibration.stereo.collector import Guidance, Offer, StereoCollector
-from rhot_app.calibration.stereo.report import StereoReport
+from rhot_app.calibration.stereo.result import StereoResult
 from rhot_app.calibration.stereo.start import WorldFrame, place_world
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.language import tr, tr_noop
@@ -204,7 +204,7 @@ class TableStep(BoardFinder):
     def __init__(self, board_step: BoardStep, solve: SolveStep, cameras: tuple[str, ...]) -> None:
         super().__init__(board_step, cameras)
         self._solve = solve
-        self._of: StereoReport | None = None
+        self._of: StereoResult | None = None
         self.world: WorldFrame | None = None
         self.problem = ""
 

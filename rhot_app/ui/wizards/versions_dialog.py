@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
@@ -14,8 +13,9 @@ from rhot_app.calibration.proposal import rows_of
 from rhot_app.errors import RhotError
 from rhot_app.project import Rig
 from rhot_app.rig_history import Version
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import Connect
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.language import date_text, tr
 from rhot_app.ui.models.palette import Scheme
@@ -28,7 +28,7 @@ class VersionsDialog(QDialog):
 
     rig_used = Signal(object)
 
-    def __init__(self, path: Path, rig: Rig, connect: Callable[[], Asker], scheme: Scheme,
+    def __init__(self, path: Path, rig: Rig, connect: Connect, scheme: Scheme,
                  parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle(tr("Earlier calibrations"))
@@ -51,9 +51,7 @@ class VersionsDialog(QDialog):
         self.back_button.setToolTip(tr("Puts the chosen version into force. What is there now is kept, and can be "
                                        "brought back the same way."))
         self.back_button.clicked.connect(self.bring_back)
-        close = QPushButton(tr("Close"))
-        close.setAutoDefault(False)
-        close.clicked.connect(self.reject)
+        close = plain_button(tr("Close"), clicked=self.reject)
         middle, buttons = QHBoxLayout(), QHBoxLayout()
         middle.addWidget(self.list)
         middle.addWidget(self.table, 1)
@@ -102,12 +100,12 @@ class VersionsDialog(QDialog):
             self._job = Job(lambda progress: self._restore(version), self._restored, self._failed, None, self).start()
 
     def _restore(self, version: Version) -> Rig:
-        with contextlib.closing(self._connect()) as asker:
-            set_rig(asker.command, rig_history.load_version(self._path, version))
+        with contextlib.closing(self._connect()) as client:
+            set_rig(client.command, rig_history.load_version(self._path, version))
             try:
                 return rig_history.restore(self._path, version)
             except RhotError:
-                set_rig(asker.command, self._rig)
+                set_rig(client.command, self._rig)
                 raise
 
     def _restored(self, rig: Rig) -> None:

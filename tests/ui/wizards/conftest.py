@@ -21,25 +21,25 @@ from rhot_app.ui.wizards.launcher import make_wizard
 
 
 def wizards(folder):
-    """Yields what opens the wizard of that name in a window, on the rig of an asker and a file of it."""
+    """Yields what opens the wizard of that name in a window, on the rig of a client and a file of it."""
     opened = []
 
-    def open_(name, asker, *, make=make_wizard, listen=None, make_solver=InProcessSolver, in_file=True):
+    def open_(name, client, *, make=make_wizard, listen=None, make_solver=InProcessSolver, in_file=True):
         path = folder / "desk.json" if in_file else None
         if path is not None:
-            save_rig(path, asker.rig)
+            save_rig(path, client.rig)
         context = WizardContext(find_calibration(name) or Calibration(name, name, "", name),
-                                InForce(asker.rig, path, asker.told), asker.connect, DARK, FakeSettingsStore(), listen,
-                                make_solver)
+                                InForce(client.rig, path, client.told), client.connect, DARK, FakeSettingsStore(),
+                                listen, make_solver)
         hands = Hands(WizardWindow(make(context), context))
-        hands.path, hands.asker, hands.rig, hands.memory = path, asker, asker.rig, context.memory
+        hands.path, hands.client, hands.rig, hands.memory = path, client, client.rig, context.memory
         opened.append(hands)
         return hands
 
     yield open_
     for hands in opened:
         assert hands.window.end().wait(PATIENCE_S)
-        hands.until(lambda asker=hands.asker: asker.connected == asker.closed)
+        hands.until(lambda client=hands.client: client.connected == client.closed)
         hands.window.deleteLater()
 
 

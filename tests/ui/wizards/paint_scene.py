@@ -21,7 +21,7 @@ _MOVE_PX = 9  # down from picture to picture, and as much to and fro: another pl
 
 
 class PaintScene:
-    """`draw` for a `FakeRigAsker`: the hand rests, or it goes down and comes up, a step with every picture."""
+    """`draw` for a `FakeRigClient`: the hand rests, or it goes down and comes up, a step with every picture."""
 
     def __init__(self, paints: dict[str, tuple[int, int, int]] = PAINTS, **options: object) -> None:
         self.moving = False

@@ -12,7 +12,7 @@ from moved_tracker import DELAY_S, FOREIGN_FROM_RIG, TRACKER_FROM_FINGER, MovedT
 from msgspec.structs import replace
 from patience import eventually
 from PySide6.QtCore import Qt
-from wizard_hand import RecordingAsker
+from wizard_hand import RecordingClient
 
 from rhot_app.calibration.kinds.alignment import propose, solve
 from rhot_app.calibration.registry import InForce
@@ -33,7 +33,7 @@ MARKERS = synthetic_rig().markers.ids
 def test_from_another_tracker_to_a_file_beside_the_rig_and_back(open_wizard):
     tracker = MovedTracker()
     poses = PoseFeed(lambda name, body: tracker if name == "udp:5000" else open_source(name, body))
-    hands = open_wizard("alignment", RecordingAsker(synthetic_rig(), write=lambda log: None), listen=tracker.listen,
+    hands = open_wizard("alignment", RecordingClient(synthetic_rig(), write=lambda log: None), listen=tracker.listen,
                         make=lambda context: alignment.make_wizard(context, poses, tracker.now_ns))
     page, path = hands.window.page, alignment_path(hands.path)
     assert [page.kind.itemText(row) for row in range(page.kind.count())][:2] == ["SteamVR", "libsurvive"]
@@ -57,7 +57,7 @@ def test_from_another_tracker_to_a_file_beside_the_rig_and_back(open_wizard):
     hands.keep("alignment-move")
     hands.until(lambda: step.phase == "recorded")
     hands.next()
-    assert hands.solved().report.verdict.acceptable, hands.verdict
+    assert hands.solved().solution.verdict.acceptable, hands.verdict
     assert len(hands.window.page.charts.plots) == 2
     hands.keep("alignment-result")
     hands.next()
@@ -111,7 +111,7 @@ def test_parallel_motion_is_refused_with_the_reason():
     view = movement.step.view()
     assert "Turn" in view.sentence and view.may_go_on and not view.done
     result, proposal, _ = movement.solve(None)
-    verdict = result.report.verdict
+    verdict = result.solution.verdict
     assert verdict.grade is Grade.POOR and "no_rotation" in verdict.codes
     assert proposal.verdict is verdict, "which forbids its use"
 

@@ -14,7 +14,7 @@ from log_writing import write_log
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Viewing, make_rig, observe
-from wizard_hand import HeldMarker, RecordingAsker
+from wizard_hand import HeldMarker, RecordingClient
 
 from rhot_app.calibration.hand.bones import solve_bones
 from rhot_app.calibration.hand.marker_places import tracks_of
@@ -44,7 +44,7 @@ def write_movement(rig, path):
 @pytest.fixture
 def hands(open_wizard):
     rig = make_rig()
-    return open_wizard("bones", RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
+    return open_wizard("bones", RecordingClient(rig, write=lambda log: write_movement(rig, log)),
                        listen=HeldMarker(FakeEngine()).connect)
 
 

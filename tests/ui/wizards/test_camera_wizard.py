@@ -9,7 +9,7 @@ from fake_engine import synthetic_rig
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMessageBox
-from wizard_rig import FakeRigAsker, FakeSettingsStore
+from wizard_rig import FakeRigClient, FakeSettingsStore
 
 from rhot_app.calibration.registry import InForce, calibration
 from rhot_app.ui.backend.feed import Picture
@@ -26,14 +26,14 @@ LIT = 150.0  # level of the room at 4 ms
 class Room:
     """A grey room before obedient cameras: more exposure, brighter picture; gains colour it."""
 
-    def __init__(self, asker):
-        self.asker = asker
+    def __init__(self, client):
+        self.client = client
         ramp = np.linspace(0.6, 1.2, 640)[None, :, None] * np.ones((480, 1, 3))
         self.scene = ramp.astype(np.float32)
         self.noise = np.random.default_rng(2).normal(0, 2, (480, 640, 3)).astype(np.float32)
 
     def draw(self, node_id, t_s):
-        camera = self.asker.settings[node_id].camera
+        camera = self.client.settings[node_id].camera
         gains = np.array([camera.blue_gain or 1.0, 1.0, camera.red_gain or 1.0]) * [1.0, 1.0, 1.25]
         light = self.scene * gains * camera.exposure_us / 4000.0 * (camera.gain or 1.0)
         picture = LIT * light ** (1 / 2.2) + self.noise
@@ -45,30 +45,30 @@ class Room:
 def compiled():
     """What looks at pictures is compiled at its first use, also what follows once a marker is found: no test should
     wait for it."""
-    asker = FakeRigAsker(synthetic_rig())
-    eye = CameraEye(asker.rig.markers)
-    for number, picture in enumerate((painted(asker.rig), Room(asker).draw(asker.rig.nodes[0].node_id, 0.0))):
+    client = FakeRigClient(synthetic_rig())
+    eye = CameraEye(client.rig.markers)
+    for number, picture in enumerate((painted(client.rig), Room(client).draw(client.rig.nodes[0].node_id, 0.0))):
         eye.look(Picture("left", picture, number, number * 30_000_000, 0), CameraSettings(), None)
 
 
 @pytest.fixture
-def asker():
-    asker = FakeRigAsker(synthetic_rig())
-    asker.draw = Room(asker).draw
-    return asker
+def client():
+    client = FakeRigClient(synthetic_rig())
+    client.draw = Room(client).draw
+    return client
 
 
 @pytest.fixture
-def hands(open_wizard, asker):
-    return open_wizard("camera", asker, in_file=False)
+def hands(open_wizard, client):
+    return open_wizard("camera", client, in_file=False)
 
 
 def row(hands, field):
     return hands.window.page.rows[field]
 
 
-def exposures(asker):
-    return [asker.settings[node_id].camera.exposure_us for node_id in (1, 2)]
+def exposures(client):
+    return [client.settings[node_id].camera.exposure_us for node_id in (1, 2)]
 
 
 def drag_grey(hands):
@@ -78,20 +78,20 @@ def drag_grey(hands):
                      view.rect().center() + QPoint(0, 80))
 
 
-def test_from_a_dark_picture_to_saved_settings(hands, asker):
+def test_from_a_dark_picture_to_saved_settings(hands, client):
     row(hands, "exposure_us").box.setValue(0.3)
-    hands.until(lambda: exposures(asker) == [300.0, 300.0])
-    assert asker.saved == [], "what is tried out is not saved"
+    hands.until(lambda: exposures(client) == [300.0, 300.0])
+    assert client.saved == [], "what is tried out is not saved"
     row(hands, "exposure_us").box.setValue(5.0)
-    hands.until(lambda: exposures(asker) == [5000.0, 5000.0])
+    hands.until(lambda: exposures(client) == [5000.0, 5000.0])
     hands.until(lambda: hands.verdict is not None)
     hands.next()
     assert hands.window.page.table.text(0, 2) == "5.00 ms"
     assert "any time" not in hands.window.page.note.text(), "nodes keep no earlier settings"
     hands.use()
-    assert asker.saved == [1, 2] and exposures(asker) == [5000.0, 5000.0]
+    assert client.saved == [1, 2] and exposures(client) == [5000.0, 5000.0]
     hands.restore()
-    assert exposures(asker) == [4000.0, 4000.0] and asker.saved == [1, 2, 2, 1]
+    assert exposures(client) == [4000.0, 4000.0] and client.saved == [1, 2, 2, 1]
 
 
 def painted(rig):
@@ -102,9 +102,9 @@ def painted(rig):
     return picture
 
 
-def test_a_good_check_is_a_result_and_ticks_the_menu(hands, asker):
-    picture = painted(asker.rig)
-    asker.draw = lambda node_id, t_s: picture
+def test_a_good_check_is_a_result_and_ticks_the_menu(hands, client):
+    picture = painted(client.rig)
+    client.draw = lambda node_id, t_s: picture
     hands.until(lambda: "good" in hands.sentence)
     hands.until(lambda: hands.frame.steps.states[0] == "current" and hands.window.step.view().done)
     told = []
@@ -112,37 +112,37 @@ def test_a_good_check_is_a_result_and_ticks_the_menu(hands, asker):
     hands.next()
     assert hands.window.page.table.records_model.rowCount() > 0
     hands.use()
-    assert told == [("camera settings", None, True)] and asker.saved == []
+    assert told == [("camera settings", None, True)] and client.saved == []
 
 
 @pytest.mark.parametrize(("shown", "code"), [("grey", "colourless"), ("covered", "flat")])
-def test_no_other_pictures_are_good(hands, asker, shown, code):
-    grey = cv2.cvtColor(cv2.cvtColor(painted(asker.rig), cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+def test_no_other_pictures_are_good(hands, client, shown, code):
+    grey = cv2.cvtColor(cv2.cvtColor(painted(client.rig), cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
     picture = grey if shown == "grey" else np.full_like(grey, 130)
-    asker.draw = lambda node_id, t_s: picture
+    client.draw = lambda node_id, t_s: picture
     hands.until(lambda: hands.verdict is not None and code in hands.verdict.codes)
     hands.until(lambda: "flicker_waiting" not in hands.verdict.codes)
     assert code in hands.verdict.codes and not hands.verdict.acceptable and not hands.window.step.view().done
 
 
-def test_a_camera_that_gives_no_picture_is_not_good(asker):
-    step = SettingsStep(CameraChoices(asker.rig.nodes, asker.told), asker.rig.markers)
+def test_a_camera_that_gives_no_picture_is_not_good(client):
+    step = SettingsStep(CameraChoices(client.rig.nodes, client.told), client.rig.markers)
     for number in range(12):
-        shown = {"left": Picture("left", painted(asker.rig), number, number * 30_000_000, 1 + number * 400_000_000)}
+        shown = {"left": Picture("left", painted(client.rig), number, number * 30_000_000, 1 + number * 400_000_000)}
         step.accept_observation(step.observe(shown))
         if number == 5:
             assert step.view().verdict.acceptable and not step.view().may_go_on, "the other one may be slow"
     assert step.view().verdict.codes >= {"no_picture"} and not step.view().done
 
 
-def test_settings_that_are_worse_are_not_used(hands, asker):
-    picture = painted(asker.rig)
+def test_settings_that_are_worse_are_not_used(hands, client):
+    picture = painted(client.rig)
 
     def draw(node_id, t_s):
         grey = np.full_like(picture, 130)
-        return grey if asker.settings[node_id].camera.contrast == 0.0 else picture
+        return grey if client.settings[node_id].camera.contrast == 0.0 else picture
 
-    asker.draw = draw
+    client.draw = draw
     hands.until(lambda: hands.verdict is not None and hands.verdict.acceptable)
     row(hands, "contrast").check_box.setChecked(True)
     row(hands, "contrast").box.setValue(0.0)
@@ -151,16 +151,16 @@ def test_settings_that_are_worse_are_not_used(hands, asker):
     assert not hands.verdict.acceptable and not hands.window.step.usable
 
 
-def test_closing_puts_back_what_was_tried_out(hands, asker, monkeypatch):
+def test_closing_puts_back_what_was_tried_out(hands, client, monkeypatch):
     monkeypatch.setattr(QMessageBox, "question", lambda *args: QMessageBox.StandardButton.Discard)
     row(hands, "exposure_us").box.setValue(20.0)
-    hands.until(lambda: exposures(asker) == [20000.0, 20000.0])
+    hands.until(lambda: exposures(client) == [20000.0, 20000.0])
     hands.key(Qt.Key.Key_Escape)
-    hands.until(lambda: exposures(asker) == [4000.0, 4000.0])
-    assert asker.saved == []
+    hands.until(lambda: exposures(client) == [4000.0, 4000.0])
+    assert client.saved == []
 
 
-def test_too_bright_pictures_are_striped_and_told(hands, asker):
+def test_too_bright_pictures_are_striped_and_told(hands, client):
     row(hands, "exposure_us").box.setValue(30.0)
     hands.until(lambda: hands.verdict is not None
                 and "over" in hands.verdict.codes)
@@ -174,7 +174,7 @@ def test_too_bright_pictures_are_striped_and_told(hands, asker):
     assert finding.figure.startswith(("left: ", "right: ")) and "Shorten exposure to " in finding.remedy
 
 
-def test_one_camera_alone_undo_and_a_slider(hands, asker):
+def test_one_camera_alone_undo_and_a_slider(hands, client):
     page = hands.window.page
     page.which.setCurrentIndex(2)
     slider = row(hands, "exposure_us").slider
@@ -182,24 +182,24 @@ def test_one_camera_alone_undo_and_a_slider(hands, asker):
     for step in (250, 260, 270):
         slider.setValue(step)
     slider.setSliderDown(False)
-    hands.until(lambda: exposures(asker)[1] > 4000.0)
-    assert exposures(asker)[0] == 4000.0
+    hands.until(lambda: exposures(client)[1] > 4000.0)
+    assert exposures(client)[0] == 4000.0
     hands.click(page.undo_button)
-    hands.until(lambda: exposures(asker) == [4000.0, 4000.0])
+    hands.until(lambda: exposures(client) == [4000.0, 4000.0])
     assert not page.undo_button.isEnabled(), "a whole movement of the slider is one step"
 
 
-def test_a_setting_is_left_to_the_camera_or_told(hands, asker):
+def test_a_setting_is_left_to_the_camera_or_told(hands, client):
     told = row(hands, "gain").check_box
     assert not told.isChecked() and not row(hands, "gain").box.isEnabled()
     told.setChecked(True)
-    hands.until(lambda: asker.settings[1].camera.gain == 1.0)
+    hands.until(lambda: client.settings[1].camera.gain == 1.0)
     told.setChecked(False)
-    hands.until(lambda: asker.settings[1].camera.gain is None)
+    hands.until(lambda: client.settings[1].camera.gain is None)
     assert not row(hands, "exposure_us").check_box.isEnabled(), "a camera must be told how long to expose"
 
 
-def test_grey_paper_balances_the_colours(hands, asker):
+def test_grey_paper_balances_the_colours(hands, client):
     page = hands.window.page
     page.which.setCurrentIndex(1)
     drag_grey(hands)
@@ -208,14 +208,14 @@ def test_grey_paper_balances_the_colours(hands, asker):
     def balanced():
         if page.balance_button.isEnabled():
             hands.click(page.balance_button)
-        camera = asker.settings[1].camera
+        camera = client.settings[1].camera
         return camera.red_gain == pytest.approx(0.8, abs=0.06) and camera.blue_gain == pytest.approx(1.0, abs=0.06)
 
     hands.until(balanced)
 
 
-def test_choices_say_only_what_differs(asker):
-    choices = CameraChoices(asker.rig.nodes, asker.told)
+def test_choices_say_only_what_differs(client):
+    choices = CameraChoices(client.rig.nodes, client.told)
     assert choices.changed == () and choices.rows(choices.changed) == ()
     choices.change((2,), RED, 1.5)
     assert [node.name for node in choices.changed] == ["right"]
@@ -225,8 +225,8 @@ def test_choices_say_only_what_differs(asker):
         choices.change((2,), EXPOSURE, -1.0)
 
 
-def test_a_silent_node_has_no_knobs(themed, asker, qtbot):
-    context = WizardContext(calibration("camera"), InForce(asker.rig), asker.connect, DARK, FakeSettingsStore())
+def test_a_silent_node_has_no_knobs(themed, client, qtbot):
+    context = WizardContext(calibration("camera"), InForce(client.rig), client.connect, DARK, FakeSettingsStore())
     plan = make_wizard(context)
     view = plan.pages[0].step.view()
     assert "No camera" in view.sentence and not view.may_go_on

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fake_engine import FakeEngine
 from simulated_protocol import recorded
-from wizard_hand import HeldMarker, RecordingAsker
+from wizard_hand import HeldMarker, RecordingClient
 
 from rhot_app.calibration.kinds import certificate as kinds_certificate
 from rhot_app.certificate.certify import certify
@@ -46,7 +46,7 @@ def hands(open_wizard, made, tmp_path, monkeypatch):
                   min(protocol.ruler, key=lambda row: abs(row.distance_mm - hands.window.page.distance.value())))
         shutil.copyfile(made.folder / source.log, log)
 
-    hands = open_wizard("certificate", RecordingAsker(made.rig, write=write),
+    hands = open_wizard("certificate", RecordingClient(made.rig, write=write),
                         listen=HeldMarker(FakeEngine()).connect)
     flash = next(page for page in hands.window.definition.pages if isinstance(page, certificate_wizard.FlashPage))
     flash.clock = itertools.count(T0_MASTER_NS, STEP_NS).__next__
@@ -125,4 +125,4 @@ def test_a_row_is_taken_back_and_closing_ends_the_recording(hands):
     hands.click(hands.window.page.button)
     hands.until(lambda: step.phase == "recording")
     hands.window.end().wait(5.0)
-    assert hands.asker.commands[-1] == "record_stop"
+    assert hands.client.commands[-1] == "record_stop"

@@ -11,7 +11,7 @@ from paint_scene import PaintScene, compile_detector, other_colours
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QFont, QFontMetricsF
 from PySide6.QtTest import QTest
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.kinds.colours import hue_chart, propose
@@ -48,7 +48,7 @@ def rig():
 
 @pytest.fixture(scope="module")
 def shared(open_shared, scene, rig):
-    return open_shared("colours", FakeRigAsker(rig, scene.draw))
+    return open_shared("colours", FakeRigClient(rig, scene.draw))
 
 
 @pytest.fixture
@@ -123,7 +123,7 @@ def learnt(step):
 
 
 def test_from_clicks_to_a_rig_and_nodes_with_the_new_colours(hands, scene):
-    before = hands.asker.settings[1].markers
+    before = hands.client.settings[1].markers
     for name in PAINTS:
         assert hands.window.step.chosen == name
         click_at(hands, "left", *PaintScene.where(name))
@@ -152,14 +152,14 @@ def test_from_clicks_to_a_rig_and_nodes_with_the_new_colours(hands, scene):
     assert not any(model.index(0, column).data(Qt.ItemDataRole.DecorationRole).isNull() for column in (1, 2))
     hands.use()
     saved = load_rig(hands.path).markers
-    assert all(settings.markers == saved for settings in hands.asker.settings.values())
+    assert all(settings.markers == saved for settings in hands.client.settings.values())
     assert saved.markers[0].chroma.hue_tolerance_deg == pytest.approx(7.0)
     seen = FastDetector(saved).detect(from_bgr(scene.draw(1)))
     for name, mark in zip(PAINTS, seen, strict=False):
         x, y = PaintScene.where(name)
         assert mark.found and abs(mark.x - x) < 3.0 and abs(mark.y - y) < 3.0, name
     hands.restore()
-    assert all(settings.markers == before for settings in hands.asker.settings.values())
+    assert all(settings.markers == before for settings in hands.client.settings.values())
 
 
 def move_a_bound(hands):

@@ -10,7 +10,7 @@ import pytest
 from fake_engine import FakeEngine, synthetic_rig
 from paint_scene import PaintScene
 from wizard_hand import HeldMarker
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.calibration.verdict import Grade
 from rhot_app.project import CameraCalibration, load_rig
@@ -44,7 +44,7 @@ def marker():
 
 def test_from_distances_to_a_rig_that_uses_them(open_wizard, marker):
     rig = msgspec.structs.replace(synthetic_rig(), calibration=CameraCalibration("exact"))
-    hands = open_wizard("depth", FakeRigAsker(rig), make=lambda context: depth.make_wizard(context, marker.clock),
+    hands = open_wizard("depth", FakeRigClient(rig), make=lambda context: depth.make_wizard(context, marker.clock),
                         listen=marker.connect)
     page = hands.window.page
     hands.until(lambda: "calibrated cameras" in hands.hint)

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QFileDialog
 from test_lens_wizard import PLACES as LENS_PLACES
 from test_stereo_wizard import PLACES as STEREO_PLACES
 from test_stereo_wizard import TRUE_BASELINE_M
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.project import CameraPose, load_rig
@@ -73,7 +73,7 @@ def choose(monkeypatch):
 
 def at_show_step(open_wizard, module, rig, **options):
     """The wizard where the board is shown; the live cameras see none."""
-    hands = open_wizard(module.__name__.rpartition(".")[2], FakeRigAsker(rig, BoardScene(rig, STANDARD_BOARD).draw),
+    hands = open_wizard(module.__name__.rpartition(".")[2], FakeRigClient(rig, BoardScene(rig, STANDARD_BOARD).draw),
                         **options)
     hands.type(hands.window.page.square, "25")
     hands.next()
@@ -112,7 +112,7 @@ def test_wrong_films_are_a_sentence_and_the_live_camera_comes_back(open_wizard, 
 
 def test_a_board_that_is_larger_than_the_form_says_is_named(open_wizard, films, choose):
     scene = BoardScene(synthetic_rig(), STANDARD_BOARD)
-    hands = open_wizard("lens", FakeRigAsker(synthetic_rig(), scene.draw))
+    hands = open_wizard("lens", FakeRigClient(synthetic_rig(), scene.draw))
     hands.window.page.cols.setValue(8)
     hands.type(hands.window.page.square, "25")
     hands.next()

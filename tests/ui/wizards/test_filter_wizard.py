@@ -14,7 +14,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from synthetic_rig import WIDE, Viewing, make_rig, observe, still_trajectory
 from waving import waving
-from wizard_hand import RecordingAsker
+from wizard_hand import RecordingClient
 
 from rhot_app.project import FilterSettings, OneEuroSettings, load_rig
 from rhot_app.ui.wizards.filters import FastGuide, LiveMeters, StillGuide
@@ -53,7 +53,7 @@ def write_movement(rig, path):
 def hands(open_wizard):
     rig = msgspec.structs.replace(make_rig(), filters=LAZY)
     hand = MovingHand(FakeEngine())
-    hands = open_wizard("filters", RecordingAsker(rig, write=lambda log: write_movement(rig, log)),
+    hands = open_wizard("filters", RecordingClient(rig, write=lambda log: write_movement(rig, log)),
                         listen=hand.connect)
     hands.hand = hand
     return hands

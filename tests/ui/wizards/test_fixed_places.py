@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QMenu,
     QWidget,
 )
-from wizard_rig import FakeRigAsker, FakeSettingsStore
+from wizard_rig import FakeRigClient, FakeSettingsStore
 
 from rhot_app.calibration.registry import InForce, calibration, calibrations
 from rhot_app.project import load_rig
@@ -53,9 +53,9 @@ def frame_of(themed):
 
     def lay_out(module, size):
         rig = load_rig(resource_path("rigs", "two_pis.json"))
-        asker = FakeRigAsker(rig)
-        asker.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
-        context = WizardContext(calibration(module), InForce(rig, None, asker.told), asker.connect, DARK,
+        client = FakeRigClient(rig)
+        client.answers = {name: {"known": False} for name in ("refined", "adapted", "measured")}
+        context = WizardContext(calibration(module), InForce(rig, None, client.told), client.connect, DARK,
                                 FakeSettingsStore(), Silence)
         definition, window = make_wizard(context), QWidget()
         cameras = tuple(node.name for node in rig.nodes)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fake_engine import synthetic_rig
 from patience import PATIENCE_S, eventually, settled
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.errors import EngineError
 from rhot_app.ui.models.proposal import restore_all, use_all
@@ -19,7 +19,7 @@ from rhot_node.network.pictures import PictureBox, encode_still
 SKIN = (115, 140, 200)  # BGR
 
 
-class LearningNodes(FakeRigAsker):
+class LearningNodes(FakeRigClient):
     """Nodes with real stores that see a desk, and a hand once `hand` says so."""
 
     def __init__(self, folder):

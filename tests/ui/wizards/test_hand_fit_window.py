@@ -18,7 +18,7 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QInputDialog, QMessageBox
 from screen_pictures import check
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.errors import RigError
 from rhot_app.hand.anatomy import load_hand
@@ -463,7 +463,7 @@ def test_the_command_ends_the_work_under_way_as_the_app_does(themed, tmp_path, m
 
 # -- on a rig whose cameras run ----------------------------------------------------------------------------------------
 
-class FittedRigAsker(FakeRigAsker):
+class FittedRigClient(FakeRigClient):
     """Gives the drawn pictures of the hand, as the nodes would."""
 
     def __init__(self, rig):
@@ -480,11 +480,11 @@ def live(themed, tmp_path):
         rig, _, _ = drawn()
         path = tmp_path / "desk.json"
         save_rig(path, rig)
-        asker, engine = FittedRigAsker(rig), FakeEngine(running=running)
-        asker.refuse = refuse
-        opened.append(fit_live(HandFit(rig), path, asker.connect, lambda: FakeClient(engine), DARK,
+        client, engine = FittedRigClient(rig), FakeEngine(running=running)
+        client.refuse = refuse
+        opened.append(fit_live(HandFit(rig), path, client.connect, lambda: FakeClient(engine), DARK,
                                Settings(tmp_path / "app.ini"), None))
-        return Person(opened[-1]), path, asker
+        return Person(opened[-1]), path, client
 
     yield make
     for window in opened:
@@ -493,7 +493,7 @@ def live(themed, tmp_path):
 
 
 def test_pictures_are_taken_of_live_cameras_and_the_hand_goes_to_the_rig(live):
-    one, path, asker = live(running=True)
+    one, path, client = live(running=True)
     window = one.window
     one.until(lambda: window.cameras.pose() is not None
               and len(window.cameras.feed.together(window.fit.names)) == 2)
@@ -507,17 +507,17 @@ def test_pictures_are_taken_of_live_cameras_and_the_hand_goes_to_the_rig(live):
     window.frame.form.rows[number.key].box.setValue(50.0)
     one.click(window.frame.use_button)
     one.until(lambda: "has this hand" in window.message)
-    assert asker.rig.hand.fingers["thumb"].bones_mm[0] == pytest.approx(50.0, abs=1e-4)
-    assert load_rig(path).hand == asker.rig.hand and versions(path)[0].replaced_by == "hand fitted to pictures"
+    assert client.rig.hand.fingers["thumb"].bones_mm[0] == pytest.approx(50.0, abs=1e-4)
+    assert load_rig(path).hand == client.rig.hand and versions(path)[0].replaced_by == "hand fitted to pictures"
     window.frame.instant_box.setCurrentIndex(0)
     window.frame.instant_box.activated.emit(0)
     assert window.live and not window.frame.contours_button.isEnabled()
 
 
 def test_cameras_without_pictures_are_said(live):
-    one, _, asker = live(running=False, refuse="Nothing heard from 127.0.0.1 for 2 s.")
+    one, _, client = live(running=False, refuse="Nothing heard from 127.0.0.1 for 2 s.")
     frame = one.window.frame
-    one.until(lambda: all(view.problem == asker.refuse for view in frame.views))
+    one.until(lambda: all(view.problem == client.refuse for view in frame.views))
     one.click(frame.take_button)
     assert "No camera" in frame.sentence.text() and one.window.fit.instant is None
 

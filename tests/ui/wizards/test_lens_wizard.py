@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from board_scene import BoardScene, compile_search
 from fake_engine import synthetic_rig
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD
 from rhot_app.calibration.kinds.lens import what_follows
@@ -42,7 +42,7 @@ def hands(open_wizard, scene):
     lens = msgspec.structs.replace(truth.nodes[0].intrinsics, fx=572.0, fy=572.0)
     rig = msgspec.structs.replace(truth, nodes=tuple(msgspec.structs.replace(node, intrinsics=lens)
                                                      for node in truth.nodes))
-    return open_wizard("lens", FakeRigAsker(rig, scene.draw))
+    return open_wizard("lens", FakeRigClient(rig, scene.draw))
 
 
 def test_from_the_board_to_a_saved_lens(hands, scene):

@@ -11,7 +11,7 @@ import pytest
 from fake_engine import synthetic_rig
 from knocked_rig import moved
 from wizard_hands import Hands
-from wizard_rig import FakeRigAsker, RigBackend
+from wizard_rig import FakeRigClient, RigBackend
 
 from rhot_app.calibration.kinds.tracked import MEASURED, REFINED, propose_hand, propose_poses
 from rhot_app.calibration.registry import InForce
@@ -24,7 +24,7 @@ from rhot_app.ui.wizards.framework.definition import OPEN_WIZARD
 from rhot_app.ui.wizards.framework.while_tracking import EngineFeed, MoveStep, ask_engine
 
 
-class RefiningAsker(FakeRigAsker):
+class RefiningClient(FakeRigClient):
     """An engine that answers `refined` as it is told."""
 
     answer: dict
@@ -52,15 +52,15 @@ def hand_answer(rig, grade=Grade.GOOD):
 
 @pytest.fixture(params=["refined"])
 def hands(open_wizard, request):
-    asker = RefiningAsker(synthetic_rig())
-    asker.answer = {"known": False}
-    return open_wizard(request.param, asker, make=lambda context: ask_engine(
+    client = RefiningClient(synthetic_rig())
+    client.answer = {"known": False}
+    return open_wizard(request.param, client, make=lambda context: ask_engine(
         context, context.calibration.collect[0], ask_s=0.02))
 
 
 def test_it_is_used_only_when_asked_and_can_be_taken_back(hands):
     assert not hands.frame.next_button.isEnabled()
-    hands.asker.answer = answer_of(hands.rig)
+    hands.client.answer = answer_of(hands.rig)
     hands.next()
     assert load_rig(hands.path) == hands.rig, "nothing was changed yet"
     hands.use()
@@ -72,11 +72,11 @@ def test_it_is_used_only_when_asked_and_can_be_taken_back(hands):
 
 @pytest.mark.parametrize(("stale", "grade"), [(False, Grade.GOOD), (True, Grade.POOR)])
 def test_what_holds_or_is_not_determined_leads_nowhere(stale, grade):
-    asker = RefiningAsker(synthetic_rig())
-    feed = EngineFeed(asker.connect, "refined")
+    client = RefiningClient(synthetic_rig())
+    feed = EngineFeed(client.connect, "refined")
     step = MoveStep(REFINED.collect[0], feed)
-    asker.answer = answer_of(asker.rig, stale=stale, grade=grade)
-    feed.step(asker)
+    client.answer = answer_of(client.rig, stale=stale, grade=grade)
+    feed.step(client)
     view = step.view()
     assert ("holds" if not stale else "Go on") in view.sentence and not view.may_go_on
 
@@ -101,7 +101,7 @@ def test_the_engines_sentence_has_the_button():
                          indirect=["hands"])
 def test_a_learnt_hand_is_used_only_when_asked(hands, reason):
     assert not hands.frame.next_button.isEnabled()
-    hands.asker.answer = hand_answer(hands.rig)
+    hands.client.answer = hand_answer(hands.rig)
     hands.next()
     assert load_rig(hands.path) == hands.rig, "nothing was changed yet"
     hands.use()
@@ -121,11 +121,11 @@ def test_only_the_hand_is_proposed():
 
 
 def test_bones_that_must_not_be_used_lead_nowhere():
-    asker = RefiningAsker(synthetic_rig())
-    feed = EngineFeed(asker.connect, "measured")
+    client = RefiningClient(synthetic_rig())
+    feed = EngineFeed(client.connect, "measured")
     step = MoveStep(MEASURED.collect[0], feed)
-    asker.answer = hand_answer(asker.rig, Grade.POOR)
-    feed.step(asker)
+    client.answer = hand_answer(client.rig, Grade.POOR)
+    feed.step(client)
     view = step.view()
     assert not view.may_go_on and not view.verdict.acceptable and "two cameras" in view.sentence
 
@@ -133,8 +133,8 @@ def test_bones_that_must_not_be_used_lead_nowhere():
 def test_the_offer_of_measured_bones_is_clicked_and_used(make_bench, tmp_path):
     bench = make_bench(RigBackend(tmp_path / "desk.json"))
     bench.track()
-    rig, asker, window = bench.controller.rig, bench.backend.rig_asker, bench.window
-    asker.answers["measured"] = hand_answer(rig)
+    rig, client, window = bench.controller.rig, bench.backend.rig_client, bench.window
+    client.answers["measured"] = hand_answer(rig)
     bench.backend.engine.advice = (Advice("info", "The bones differ by 4 mm.", "measured", subject="information"),)
     bench.until(lambda: "Use measured bones …" in window.advice.buttons)
     bench.click(window.advice.buttons["Use measured bones …"])

@@ -11,7 +11,7 @@ from board_scene import BoardScene, compile_search
 from fake_engine import EXACT, synthetic_rig
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.calibration.board.boards import STANDARD_BOARD, Chessboard
 from rhot_app.calibration.board.size_check import Beyond
@@ -62,7 +62,7 @@ def scene():
 @pytest.fixture
 def hands(open_wizard, wrong_rig, scene):
     """The wizard on a rig file, before drawn boards."""
-    return open_wizard("stereo", FakeRigAsker(wrong_rig, scene.draw))
+    return open_wizard("stereo", FakeRigClient(wrong_rig, scene.draw))
 
 
 def test_from_the_board_to_a_saved_rig(hands, scene):
@@ -95,7 +95,7 @@ def test_from_the_board_to_a_saved_rig(hands, scene):
     assert load_rig(hands.path).calibration == EXACT, "nothing is written yet"
     assert texts[0] == "left to right: distance" and texts[1] == "60.00 mm"
     assert float(texts[2].split(" ± ")[0]) == pytest.approx(75.0, abs=0.2)
-    assert np.linalg.norm(hands.asker.rig.nodes[1].pose.translation_m) == pytest.approx(0.06)
+    assert np.linalg.norm(hands.client.rig.nodes[1].pose.translation_m) == pytest.approx(0.06)
     hands.use()
     saved = load_rig(hands.path)
     left, right = saved.nodes
@@ -128,7 +128,7 @@ def test_nobody_gets_past_the_board_without_measuring_it(hands, scene):
 
 
 def test_the_ruler_is_clicked_in_held_pictures(open_wizard, wrong_rig):
-    hands = open_wizard("Ruler", FakeRigAsker(wrong_rig),
+    hands = open_wizard("Ruler", FakeRigClient(wrong_rig),
                         make=lambda context: Definition((LengthsPage(LengthsStep(CAMERAS)),)))
     page, step = hands.window.page, hands.window.step
     assert not page.hold.isEnabled()

@@ -11,7 +11,7 @@ from log_writing import write_log
 from patience import PATIENCE_S
 from PySide6.QtCore import Qt
 from waving import see, waving
-from wizard_hand import HeldMarker, RecordingAsker
+from wizard_hand import HeldMarker, RecordingClient
 
 from rhot_app.calibration.registry import InForce
 from rhot_app.project import load_rig
@@ -29,7 +29,7 @@ def hands(open_wizard):
                      said_ns=(ROW_NS, ROW_NS))
         write_log(Path(log), rig, frames)
 
-    return open_wizard("time", RecordingAsker(rig, write=write), listen=HeldMarker(FakeEngine()).connect)
+    return open_wizard("time", RecordingClient(rig, write=write), listen=HeldMarker(FakeEngine()).connect)
 
 
 def test_from_waving_to_a_rig_that_knows_the_delay(hands):
@@ -39,7 +39,7 @@ def test_from_waving_to_a_rig_that_knows_the_delay(hands):
     hands.until(lambda: page.movement.phase == "recording" and page.button.text() == "Stop")
     assert "60 s left" in hands.sentence
     hands.click(page.button)
-    assert hands.asker.commands.index("start") < hands.asker.commands.index("record"), "a rig at rest sends nothing"
+    assert hands.client.commands.index("start") < hands.client.commands.index("record"), "a rig at rest sends nothing"
     hands.until(lambda: page.movement.phase == "recorded")
     hands.next()
     hands.solved()
@@ -50,7 +50,7 @@ def test_from_waving_to_a_rig_that_knows_the_delay(hands):
 
 
 def test_what_the_engine_refuses_is_said_and_nothing_goes_on(hands):
-    hands.asker.refuse = "the disk is full."
+    hands.client.refuse = "the disk is full."
     hands.click(hands.window.page.button)
     hands.until(lambda: "the disk is full" in hands.hint)
     assert not hands.window.frame.next_button.isEnabled()
@@ -60,7 +60,7 @@ def test_closing_while_it_records_ends_the_recording(hands):
     hands.click(hands.window.page.button)
     hands.until(lambda: hands.window.page.movement.phase == "recording")
     hands.window.end().wait(PATIENCE_S)
-    assert hands.asker.commands[-1] == "record_stop"
+    assert hands.client.commands[-1] == "record_stop"
 
 
 def test_a_wrong_row_time_is_told_to_its_node():

@@ -13,7 +13,7 @@ import pytest
 import slow_work
 from fake_engine import synthetic_rig
 from patience import PATIENCE_S, eventually, quickest, settled
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.app import NICENESS as WINDOW_NICENESS
@@ -27,13 +27,13 @@ from rhot_app.ui.wizards.framework.step import Step
 
 
 @pytest.fixture
-def asker():
-    return FakeRigAsker(synthetic_rig())
+def client():
+    return FakeRigClient(synthetic_rig())
 
 
 @pytest.fixture
-def feed(asker):
-    feed = LiveFeed({"left": 1, "right": 2}, asker.connect, rate_hz=50.0).start()
+def feed(client):
+    feed = LiveFeed({"left": 1, "right": 2}, client.connect, rate_hz=50.0).start()
     yield feed
     feed.stop()
 
@@ -73,43 +73,43 @@ def test_the_feed_keeps_newest_pictures_of_both_cameras(feed):
     assert abs(together["left"].received_ns - together["right"].received_ns) < 100_000_000
 
 
-def test_the_feed_says_why_there_is_no_picture_and_goes_on_afterwards(feed, asker):
-    asker.refuse = "node left does not answer."
-    eventually(lambda: feed.problem("left") == asker.refuse)
-    asker.refuse = ""
+def test_the_feed_says_why_there_is_no_picture_and_goes_on_afterwards(feed, client):
+    client.refuse = "node left does not answer."
+    eventually(lambda: feed.problem("left") == client.refuse)
+    client.refuse = ""
     eventually(lambda: feed.problem("left") == "")
     assert feed.newest("left") is not None
 
 
-def test_a_paused_feed_asks_for_nothing(feed, asker):
+def test_a_paused_feed_asks_for_nothing(feed, client):
     eventually(lambda: feed.newest("left") is not None)
     feed.pause(True)
 
     def silent():
-        asked = len(asker.commands)
-        return settled(lambda: len(asker.commands) == asked, 0.3)
+        asked = len(client.commands)
+        return settled(lambda: len(client.commands) == asked, 0.3)
 
     eventually(silent)  # what was under way is still asked
-    asked = len(asker.commands)
+    asked = len(client.commands)
     feed.pause(False)
-    eventually(lambda: len(asker.commands) > asked)
+    eventually(lambda: len(client.commands) > asked)
     assert feed.problem("left") == ""
 
 
-def test_a_picture_that_was_overtaken_is_left_out(asker):
-    feed = LiveFeed({"left": 1}, asker.connect)
-    feed.step("left", asker)
+def test_a_picture_that_was_overtaken_is_left_out(client):
+    feed = LiveFeed({"left": 1}, client.connect)
+    feed.step("left", client)
     newest = feed.newest("left")
-    asker.number = newest.number - 2
-    feed.step("left", asker)
+    client.number = newest.number - 2
+    feed.step("left", client)
     assert feed.newest("left") is newest
 
 
-def test_a_stopped_feed_closes_its_connections(asker):
-    feed = LiveFeed({"left": 1}, asker.connect, rate_hz=50.0).start()
+def test_a_stopped_feed_closes_its_connections(client):
+    feed = LiveFeed({"left": 1}, client.connect, rate_hz=50.0).start()
     eventually(lambda: feed.newest("left") is not None)
     feed.stop()
-    assert asker.closed == 2
+    assert client.closed == 2
 
 
 class Stubborn(Reader):

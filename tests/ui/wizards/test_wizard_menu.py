@@ -58,9 +58,9 @@ def test_a_wizard_opens_over_the_window_and_its_age_stands_in_the_menu(bench):
 
 
 def test_a_wizard_that_cannot_open_says_why(bench):
-    bench.backend.rig_asker.refuse = "The engine does not answer."
+    bench.backend.rig_client.refuse = "The engine does not answer."
     bench.window.actions_.wizards[-2].trigger()
-    bench.until(lambda: bench.said(bench.backend.rig_asker.refuse))
+    bench.until(lambda: bench.said(bench.backend.rig_client.refuse))
     assert bench.window.wizards.wizard is None
 
 
@@ -80,10 +80,10 @@ def test_closing_the_app_ends_an_open_wizard_without_a_question(bench):
 
 
 def test_an_earlier_version_is_brought_back_and_that_is_undone(bench):
-    path, asker = bench.backend.path, bench.backend.rig_asker
-    moved = msgspec.structs.replace(asker.rig, name="newer", nodes=(
-        asker.rig.nodes[0], msgspec.structs.replace(asker.rig.nodes[1], time_offset_s=0.002)))
-    asker.rig = moved
+    path, client = bench.backend.path, bench.backend.rig_client
+    moved = msgspec.structs.replace(client.rig, name="newer", nodes=(
+        client.rig.nodes[0], msgspec.structs.replace(client.rig.nodes[1], time_offset_s=0.002)))
+    client.rig = moved
     rig_history.accept(path, moved, "time calibration")
     bench.window.actions_.earlier.trigger()
     bench.until(lambda: bench.window.wizards.versions is not None)
@@ -94,10 +94,10 @@ def test_an_earlier_version_is_brought_back_and_that_is_undone(bench):
     check("earlier-calibrations", dialog.grab().toImage(), 8)
     bench.click(dialog.back_button)
     bench.until(lambda: "back in force" in dialog.sentence.text())
-    assert asker.rig.name == "test bench" == load_rig(path).name and dialog.list.count() == 2
+    assert client.rig.name == "test bench" == load_rig(path).name and dialog.list.count() == 2
     bench.click(dialog.back_button)
     bench.until(lambda: load_rig(path).name == "newer")
-    assert asker.rig.name == "newer"
+    assert client.rig.name == "newer"
     QTest.keyClick(dialog, Qt.Key.Key_Escape)
 
 

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import msgspec
 import pytest
 from fake_engine import synthetic_rig
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app import rig_history
 from rhot_app.calibration.proposal import NodeChange, Proposal, Row
@@ -23,8 +23,8 @@ from rhot_app.ui.wizards.launcher import age_text
 
 
 @pytest.fixture
-def asker():
-    return FakeRigAsker(synthetic_rig())
+def client():
+    return FakeRigClient(synthetic_rig())
 
 
 def test_remaining_time_in_words():
@@ -50,27 +50,27 @@ def change_of(path, name):
     return RigChange(before, msgspec.structs.replace(before, name=name), path, "lens calibration")
 
 
-def test_a_rig_change_goes_to_engine_and_file_and_back(asker, tmp_path):
+def test_a_rig_change_goes_to_engine_and_file_and_back(client, tmp_path):
     path = rig_file(tmp_path)
     change = change_of(path, "new")
-    change.use(asker.command)
-    assert asker.rig.name == "new" and load_rig(path).name == "new"
+    change.use(client.command)
+    assert client.rig.name == "new" and load_rig(path).name == "new"
     assert [v.replaced_by for v in rig_history.versions(path)] == ["lens calibration"]
-    change.restore(asker.command)
-    assert asker.rig.name == "desk" and load_rig(path).name == "desk"
+    change.restore(client.command)
+    assert client.rig.name == "desk" and load_rig(path).name == "desk"
     assert len(rig_history.versions(path)) == 2, "the new one can be brought back as well"
 
 
-def test_a_rig_that_cannot_be_written_is_not_left_in_the_engine(asker, tmp_path):
+def test_a_rig_that_cannot_be_written_is_not_left_in_the_engine(client, tmp_path):
     path = rig_file(tmp_path)
     change = change_of(path, "new")
     gone = RigChange(change.before, change.after, tmp_path / "missing" / "desk.json", "lens calibration")
     with pytest.raises(RigError):
-        gone.use(asker.command)
-    assert asker.rig.name == "desk"
+        gone.use(client.command)
+    assert client.rig.name == "desk"
 
 
-def test_a_proposal_is_put_into_force_whole_or_not_at_all(asker, tmp_path):
+def test_a_proposal_is_put_into_force_whole_or_not_at_all(client, tmp_path):
     path = rig_file(tmp_path)
 
     class Refusing:
@@ -83,8 +83,8 @@ def test_a_proposal_is_put_into_force_whole_or_not_at_all(asker, tmp_path):
         way_back = ""
 
     with pytest.raises(EngineError):
-        use_all((change_of(path, "new"), Refusing()), asker.command)
-    assert load_rig(path).name == "desk" and asker.rig.name == "desk"
+        use_all((change_of(path, "new"), Refusing()), client.command)
+    assert load_rig(path).name == "desk" and client.rig.name == "desk"
 
 
 def test_a_proposal_changes_the_rig_and_what_it_names(tmp_path):
@@ -97,12 +97,12 @@ def test_a_proposal_changes_the_rig_and_what_it_names(tmp_path):
     assert changes_of(Proposal("camera settings", judge("good", []), (), changes=(node,)), path) == (node,)
 
 
-def test_a_node_change_goes_to_the_node_and_back(asker):
+def test_a_node_change_goes_to_the_node_and_back(client):
     change = NodeChange(2, {"camera": {"gain": None}}, {"camera": {"gain": 2.5}})
-    change.use(asker.command)
-    assert asker.settings[2].camera.gain == 2.5 and asker.settings[1].camera.gain is None
-    change.restore(asker.command)
-    assert asker.settings[2].camera.gain is None
+    change.use(client.command)
+    assert client.settings[2].camera.gain == 2.5 and client.settings[1].camera.gain is None
+    change.restore(client.command)
+    assert client.settings[2].camera.gain is None
 
 
 def test_only_what_a_rigs_file_keeps_is_said_to_come_back_at_any_time(tmp_path):
@@ -127,7 +127,7 @@ def test_no_step_is_done_or_says_next_beside_a_verdict_that_forbids(grade):
     assert solve.view().done == ("go on" in solve.view().sentence) == verdict.acceptable
 
 
-def test_the_last_step_refuses_a_poor_result_and_comes_back(asker):
+def test_the_last_step_refuses_a_poor_result_and_comes_back(client):
     poor = judge("rms 9 px", [Finding("rms", Grade.POOR, "rms 9 px", "The board moved.", "Hold it still.")])
     step = AcceptStep(lambda: Proposal("lens calibration", poor, (Row("rms", "0.3 px", "9 px"),)), None)
     step.enter()

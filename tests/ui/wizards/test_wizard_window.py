@@ -13,7 +13,7 @@ from patience import eventually
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox
 from sample_wizard import brightest
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app import rig_history
 from rhot_app.calibration.registry import calibrations
@@ -28,15 +28,15 @@ from rhot_app.ui.wizards.framework.step import AnnotatedPicture, StepView
 
 
 @pytest.fixture
-def asker():
-    return FakeRigAsker(synthetic_rig())
+def client():
+    return FakeRigClient(synthetic_rig())
 
 
 @pytest.fixture
-def open_sample(open_wizard, asker):
+def open_sample(open_wizard, client):
     """Opens the sample wizard on a rig file."""
     return lambda steps=3, **options: open_wizard(
-        "Sample", asker, make=lambda context: sample_wizard.make_wizard(context, steps), **options)
+        "Sample", client, make=lambda context: sample_wizard.make_wizard(context, steps), **options)
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def capture_three(hands):
         assert len(hands.window.step.captured) == count
 
 
-def test_from_the_first_page_to_a_saved_rig_and_back(open_sample, asker):
+def test_from_the_first_page_to_a_saved_rig_and_back(open_sample, client):
     hands = open_sample()
     frame = hands.window.frame
     used = []
@@ -72,10 +72,10 @@ def test_from_the_first_page_to_a_saved_rig_and_back(open_sample, asker):
     assert hands.window.page.table.text(0, 2) == "535.9 ± 0.4 px"
     hands.use()
     assert frame.next_button.text() == "Close"
-    assert load_rig(hands.path).name == "calibrated" and asker.rig.name == "calibrated"
+    assert load_rig(hands.path).name == "calibrated" and client.rig.name == "calibrated"
     assert [version.replaced_by for version in rig_history.versions(hands.path)] == ["lens calibration"]
     hands.restore()
-    assert load_rig(hands.path).name == "test bench" and asker.rig.name == "test bench"
+    assert load_rig(hands.path).name == "test bench" and client.rig.name == "test bench"
     assert used == ["calibrated", "test bench"]
 
 
@@ -208,15 +208,15 @@ def test_escape_asks_only_when_something_would_be_lost(open_sample, monkeypatch)
     assert not hands.window.isVisible() and len(asked) == 2
 
 
-def test_a_failure_to_save_is_said_and_changes_nothing(open_sample, asker):
+def test_a_failure_to_save_is_said_and_changes_nothing(open_sample, client):
     hands = open_sample()
     capture_three(hands)
     hands.next()
     hands.next()
     hands.until(lambda: hands.frame.next_button.text() == "Use this calibration")
-    asker.refuse = "The engine does not answer."
+    client.refuse = "The engine does not answer."
     hands.next()
-    hands.until(lambda: hands.hint == asker.refuse)
+    hands.until(lambda: hands.hint == client.refuse)
     assert load_rig(hands.path).name == "test bench" and hands.window.step.usable
 
 
@@ -250,9 +250,9 @@ def test_a_drag_over_a_picture_is_in_its_own_pixels(open_sample):
     assert picture.camera == "left" and box == pytest.approx([100, 60, 80, 60], abs=2.0)
 
 
-def test_a_silent_camera_is_named_in_its_picture(open_sample, asker):
+def test_a_silent_camera_is_named_in_its_picture(open_sample, client):
     hands = open_sample()
-    asker.refuse = "node left does not answer on its control channel."
+    client.refuse = "node left does not answer on its control channel."
     view = hands.frame.grid.views["left"]
-    hands.until(lambda: view.problem == asker.refuse)
+    hands.until(lambda: view.problem == client.refuse)
     assert hands.window.isVisible()

@@ -1,4 +1,4 @@
-"""A hand for the wizards' tests: a listener that hears made-up states, and an asker that writes made-up logs."""
+"""A hand for the wizards' tests: a listener that hears made-up states, and a client that writes made-up logs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from fake_engine import FakeEngine
-from wizard_rig import FakeRigAsker
+from wizard_rig import FakeRigClient
 
 from rhot_app.state import HandState
 
@@ -40,7 +40,7 @@ class HeldMarker:
         return [replace(state, camera_pixels=pixels)]
 
 
-class RecordingAsker(FakeRigAsker):
+class RecordingClient(FakeRigClient):
     """Also answers `record` and `record_stop`: `write(path)` makes the log."""
 
     def __init__(self, *args: object, write: Callable[[str], None], **options: object) -> None:

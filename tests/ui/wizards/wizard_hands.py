@@ -18,7 +18,7 @@ def opened(launcher, window):
 
 
 class Hands(Person):
-    """A person in front of one `WizardWindow`; `path` is the rig's file, `asker` what answers for the engine."""
+    """A person in front of one `WizardWindow`; `path` is the rig's file, `client` what answers for the engine."""
 
     wait = staticmethod(wait)
 

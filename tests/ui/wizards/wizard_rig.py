@@ -1,4 +1,4 @@
-"""A rig without processes for the wizards' tests: an asker that gives pictures and keeps rig and settings."""
+"""A rig without processes for the wizards' tests: a client that gives pictures and keeps rig and settings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class FakeSettingsStore(dict[str, str]):
         self[name] = text
 
 
-class FakeRigAsker:
+class FakeRigClient:
     """What the engine's client answers to `still`, `rig`, `set_rig` and `node`; `draw` makes the pictures."""
 
     def __init__(self, rig: Rig, draw: Draw = grey_picture) -> None:
@@ -60,8 +60,8 @@ class FakeRigAsker:
         """The nodes' settings by node id, as they give them."""
         return {node_id: msgspec.to_builtins(one) for node_id, one in self.settings.items()}
 
-    def connect(self) -> FakeRigAsker:
-        """One asker for everybody."""
+    def connect(self) -> FakeRigClient:
+        """One client for everybody."""
         self.connected += 1
         return self
 
@@ -110,13 +110,13 @@ class RigBackend(FakeBackend):
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.path = path
-        self.rig_asker = FakeRigAsker(self.engine.rig)
-        self.rig_asker.path = str(path)
+        self.rig_client = FakeRigClient(self.engine.rig)
+        self.rig_client.path = str(path)
         self.engine.rig_path = str(path)
         save_rig(path, self.engine.rig)
 
-    def asker(self):
-        return self.rig_asker
+    def command_client(self):
+        return self.rig_client
 
     def _opened(self, path, *, simulated):
         return Opened(self.engine.rig, str(self.path), self.engine.running, self.ours, simulated)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rhot_app.calibration.colour.colours import ColourReport
+from rhot_app.calibration.colour.colours import ColourResult
 from rhot_app.ui.language import tr
 from rhot_app.ui.wizards.colours.bounds import BoundsPage, BoundsStep
 from rhot_app.ui.wizards.colours.pick import PickPage, PickStep
@@ -19,7 +19,7 @@ def make_wizard(context: WizardContext) -> Definition:
     bounds = BoundsStep(context.calibration, context.now, picks)
     apart = SeparationStep(context.calibration, context.now, bounds)
 
-    def judged_now(result: ColourReport) -> ColourReport:
+    def judged_now(result: ColourResult) -> ColourResult:
         """With what the light says since then."""
         assert apart.report is not None
         return replace(result, verdict=apart.report.verdict)

@@ -8,10 +8,11 @@ import msgspec
 from PySide6.QtWidgets import QHBoxLayout
 
 from rhot_app.calibration.registry import Calibration, InForce
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.colours.masks import MaskChoice, MaskedPictures, MaskMaker, Show, annotated_by_masks, drift_of
-from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow, paint_button
+from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow
 from rhot_app.ui.wizards.colours.pick import PickStep
 from rhot_app.ui.wizards.framework.control_row import Control, ControlRow, Value
 from rhot_app.ui.wizards.framework.page import Page, shrinkable
@@ -168,9 +169,9 @@ class BoundsPage(Page):
         self.list = PaintList(scheme, ("marker", "hue"))
         self.mask_choice = MaskChoice()
         self.rows = {control.field: ControlRow(control) for control in BOUNDS}
-        self.again = paint_button(tr("As learnt"),
-                                  tr("The chosen marker's bounds as they were learnt from the samples."))
-        self.undo_button = paint_button(tr("Undo"), tr("Ctrl+Z. The last change back."))
+        self.again = plain_button(tr("As learnt"), tr("The chosen marker's bounds as they were learnt from the "
+                                                      "samples."))
+        self.undo_button = plain_button(tr("Undo"), tr("Ctrl+Z. The last change back."))
         self.column.addWidget(self.list, 1)
         shrinkable(self.list)
         for row in self.rows.values():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PySide6.QtWidgets import QComboBox
 
 from rhot_app.calibration.colour.cause import Cause, Explainer
-from rhot_app.calibration.colour.illuminant import DriftReport, IlluminantDrift, drift_findings
+from rhot_app.calibration.colour.illuminant import DriftResult, IlluminantDrift, drift_findings
 from rhot_app.calibration.verdict import Finding
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.language import tr, tr_noop
@@ -39,7 +39,7 @@ class MaskedPicture:
     image: YuvImage
     labels: NDArray[np.uint8]
     seen: tuple[MarkerObservation, ...]
-    drift: DriftReport
+    drift: DriftResult
     causes: Mapping[int, Cause]
 
     def why(self, index: int) -> str:

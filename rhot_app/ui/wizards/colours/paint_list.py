@@ -8,7 +8,7 @@ from operator import attrgetter
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QHeaderView, QPushButton
+from PySide6.QtWidgets import QHeaderView
 
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.shapes import shape_pixmap
@@ -82,10 +82,3 @@ def _state_icon(shape: str, tone: str, selected: str, ratio: float) -> QIcon:
     for mode, colour in ((QIcon.Mode.Normal, tone), (QIcon.Mode.Selected, selected)):
         icon.addPixmap(shape_pixmap(shape, colour, _STATE_PX, ratio), mode)
     return icon
-
-
-def paint_button(text: str, meaning: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setAutoDefault(False)
-    button.setToolTip(meaning)
-    return button

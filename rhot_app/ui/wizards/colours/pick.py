@@ -10,10 +10,11 @@ from rhot_app.calibration.colour.separability import SKIN
 from rhot_app.calibration.verdict import Finding, Grade, Verdict, judge
 from rhot_app.errors import CalibrationError
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
 from rhot_app.ui.wizards.colours.masks import MaskChoice, MaskedPictures, MaskMaker, Show, annotated_by_masks, drift_of
-from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow, paint_button
+from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow
 from rhot_app.ui.wizards.framework.page import Page, shrinkable
 from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Bar, Pictures, Step, StepView
 from rhot_node.detect.colour import learn_chroma_from_colours
@@ -234,9 +235,9 @@ class PickPage(Page):
                                 "the skin's. Ctrl+Z takes the last click back; clicking a marker anew replaces what "
                                 "was gathered for it."))
         self.mask_choice = MaskChoice()
-        self.hold = paint_button(tr("Hold the pictures"),
-                                 tr("Space. Then click at leisure; Space again lets them go on."))
-        self.undo_button = paint_button(tr("Undo"), tr("Ctrl+Z. The last click back."))
+        self.hold = plain_button(tr("Hold the pictures"), tr("Space. Then click at leisure; Space again lets them go "
+                                                             "on."))
+        self.undo_button = plain_button(tr("Undo"), tr("Ctrl+Z. The last click back."))
         for widget in (self.list, self.mask_choice, self.hold, self.undo_button):
             self.column.addWidget(widget, 1 if widget is self.list else 0)
         shrinkable(self.list)

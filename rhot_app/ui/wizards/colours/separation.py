@@ -11,7 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QHeaderView, QLabel, QVBoxLayout, QWidget
 
-from rhot_app.calibration.colour.colours import ColourReport
+from rhot_app.calibration.colour.colours import ColourResult
 from rhot_app.calibration.colour.verdict import OVERLAP
 from rhot_app.calibration.registry import Calibration, InForce
 from rhot_app.calibration.verdict import Finding, with_findings
@@ -37,7 +37,7 @@ class SeparationStep(SolveStep):
                          tr("Go back and pick a colour."))
         self.cameras = bounds.cameras
         self._bounds = bounds
-        self._learnt: ColourReport | None = None
+        self._learnt: ColourResult | None = None
         self._given: Mapping[str, ChromaModel] = {}
         self._maker = MaskMaker()
 
@@ -84,7 +84,7 @@ class SeparationPage(Page):
     def __init__(self, step: SeparationStep, scheme: Scheme) -> None:
         super().__init__(step)
         self._apart = step
-        self._shown: ColourReport | None = None
+        self._shown: ColourResult | None = None
         self._scheme = scheme
         self.charts = ChartView(scheme)
         self.table: RecordTable[ColourShares] = RecordTable((), selectable=False)
@@ -118,7 +118,7 @@ class SeparationPage(Page):
             if result is not None:
                 self._fill(result)
 
-    def _fill(self, result: ColourReport) -> None:
+    def _fill(self, result: ColourResult) -> None:
         names = result.names
         columns = [Column[ColourShares]("", lambda row: row[0])]
         for number, head in enumerate((*names, *result.separability.others)):

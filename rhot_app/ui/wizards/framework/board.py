@@ -19,7 +19,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
     QLineEdit,
-    QPushButton,
     QSpinBox,
     QWidget,
 )
@@ -31,6 +30,7 @@ from rhot_app.calibration.board.standard_board import BOARD, KINDS, MARKER_SHARE
 from rhot_app.calibration.board.target import write_target
 from rhot_app.calibration.verdict import Finding
 from rhot_app.errors import CalibrationError
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.definition import SettingsStore
 from rhot_app.ui.wizards.framework.drawing import board_marks
@@ -327,11 +327,9 @@ class BoardPage(Page):
                              (tr("Marker, mm"), self.marker), (tr("Family"), self.dictionary)):
             self._form.addRow(label, field)
         self._form.addRow(self.legacy)
-        self.print_button = QPushButton(tr("Print this board"))
-        self.print_button.setAutoDefault(False)
-        self.print_button.setToolTip(tr("Writes it as a PDF of the usual size with a ruler, and opens that to be "
-                                        "printed."))
-        self.print_button.clicked.connect(self._print)
+        self.print_button = plain_button(tr("Print this board"), tr("Writes it as a PDF of the usual size with a "
+                                                                    "ruler, and opens that to be printed."),
+                                         self._print)
         self.note = QLabel(tr(_NOTE))
         self.note.setWordWrap(True)
         self.note.setProperty("muted", True)

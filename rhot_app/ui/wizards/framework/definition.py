@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from rhot_app.calibration.proposal import Proposal
 from rhot_app.calibration.registry import Calibration, InForce
 from rhot_app.project import Rig
-from rhot_app.ui.backend.contract import Asker, Listener
+from rhot_app.ui.backend.contract import Connect, Listener
 from rhot_app.ui.backend.solver import Solver
 from rhot_app.ui.language import tr_noop
 from rhot_app.ui.models.palette import Scheme
@@ -41,7 +41,7 @@ class WizardContext:
 
     calibration: Calibration
     now: InForce
-    connect: Callable[[], Asker]
+    connect: Connect
     scheme: Scheme
     memory: SettingsStore
     listen: Callable[[], Listener] | None = None

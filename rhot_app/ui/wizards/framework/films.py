@@ -20,6 +20,7 @@ from rhot_app.calibration.verdict import Finding
 from rhot_app.progress import Progress, within
 from rhot_app.sources.film_offset import FilmOffset, offset_sentence, offsets_of
 from rhot_app.ui.backend.feed import Picture
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.wizards.framework.board import OTHER_BOARD, BoardSearch
 from rhot_app.ui.wizards.framework.drawing import board_marks
@@ -211,7 +212,8 @@ class FilmsPage(Page):
         self.began.setToolTip(tr("How it is known by how much one film began later than the other: by what all cameras "
                                  "heard, or by a light that went on once."))
         self.began.currentIndexChanged.connect(self._align)
-        self.live = _button(tr("Live cameras"), tr("Films are left out; views are taken of the live cameras again."))
+        self.live = plain_button(tr("Live cameras"), tr("Films are left out; views are taken of the live cameras "
+                                                        "again."))
         self.live.clicked.connect(self._use_live)
         self.column.addWidget(self.began)
         self.column.addWidget(self.live)
@@ -226,8 +228,9 @@ class FilmsPage(Page):
                 button.deleteLater()
             self.buttons = {}
             for place, camera in enumerate(cameras):
-                button = _button("", tr("A recorded film of the board in place of the live camera: move the board, "
-                                        "rest it for half a second, and move it on. Frames are chosen by themselves."))
+                button = plain_button("", tr("A recorded film of the board in place of the live camera: move the "
+                                             "board, rest it for half a second, and move it on. Frames are chosen by "
+                                             "themselves."))
                 button.clicked.connect(partial(self._choose, camera))
                 self.column.insertWidget(place, button)
                 button.show()
@@ -260,10 +263,3 @@ class FilmsPage(Page):
     def _use_live(self) -> None:
         self._shows.use_live()
         self.changed.emit()
-
-
-def _button(text: str, meaning: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setAutoDefault(False)
-    button.setToolTip(meaning)
-    return button

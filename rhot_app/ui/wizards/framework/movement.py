@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QLabel, QPushButton
 from rhot_app.calibration.collect import Bar, Guide, Movement
 from rhot_app.errors import EngineError
 from rhot_app.state import HandState
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import Connect
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.common.job import Job
 from rhot_app.ui.language import tr, tr_noop
@@ -173,7 +173,7 @@ _LABELS = {"waiting": tr_noop("Record"), "beginning": tr_noop("Record"), "record
 class MovementPage(Page):
     """Begins and ends the recording of a `MovementStep`."""
 
-    def __init__(self, step: MovementStep, connect: Callable[[], Asker], states: StateFeed, note: str = NOTE) -> None:
+    def __init__(self, step: MovementStep, connect: Connect, states: StateFeed, note: str = NOTE) -> None:
         super().__init__(step)
         self.movement = step
         self._connect = connect
@@ -209,13 +209,13 @@ class MovementPage(Page):
                             self).start()
 
     def _ask(self, request: Request) -> None:
-        with contextlib.closing(self._connect()) as asker:
+        with contextlib.closing(self._connect()) as client:
             if request.kind == "end":
-                asker.command("record_stop")
+                client.command("record_stop")
             else:
-                if not asker.command("hello").get("running", True):
-                    asker.command("start")
-                asker.command("record", path=str(request.path))
+                if not client.command("hello").get("running", True):
+                    client.command("start")
+                client.command("record", path=str(request.path))
 
     def _answered(self, request: Request) -> None:
         self.movement.answered(request)
@@ -247,7 +247,7 @@ class Movements:
         """A page that records a movement."""
         return self.page_of(MovementPage, movement)
 
-    def page_of(self, make: Callable[[MovementStep, Callable[[], Asker], StateFeed], PageT],
+    def page_of(self, make: Callable[[MovementStep, Connect, StateFeed], PageT],
                 movement: Movement) -> PageT:
         """The same on a page that shows more."""
         page = make(self.add(MovementStep(movement, self.folder, self.states.recent)), self._connect, self.states)
@@ -263,6 +263,6 @@ class Movements:
         """End a recording that still runs, and throw the logs away. In a worker."""
         self.states.stop()
         if any(step.phase in ("beginning", "recording", "ending") for step in self._steps):
-            with contextlib.closing(self._connect()) as asker:
-                asker.command("record_stop")
+            with contextlib.closing(self._connect()) as client:
+                client.command("record_stop")
         shutil.rmtree(self.folder, ignore_errors=True)

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QHeaderView,
     QLabel,
-    QPushButton,
     QScrollArea,
     QSizePolicy,
     QStyledItemDelegate,
@@ -31,6 +30,7 @@ from rhot_app.calibration.verdict import Finding, Verdict
 from rhot_app.charts import Chart, Curve, Span, ticks
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.disposal import plot_widget
+from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.shapes import ShapeMark
 from rhot_app.ui.common.theme import CELL_PADDING_PX, app_font
@@ -92,9 +92,7 @@ class AcceptPage(Page):
         self._rows: tuple[Row, ...] | None = None
         self.table = RowTable(scheme, heads)
         self.centre = self.table
-        self.restore_button = QPushButton(tr("Restore the old one"))
-        self.restore_button.setAutoDefault(False)
-        self.restore_button.setToolTip(tr("Brings back what was there before."))
+        self.restore_button = plain_button(tr("Restore the old one"), tr("Brings back what was there before."))
         self.restore_button.clicked.connect(self.restore_asked)
         self.note = QLabel()
         self.note.setWordWrap(True)

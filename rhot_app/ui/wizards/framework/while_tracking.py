@@ -10,7 +10,7 @@ from rhot_app.calibration.collect import Answer, WhileTracking
 from rhot_app.calibration.proposal import Proposal
 from rhot_app.calibration.verdict import verdict_from
 from rhot_app.errors import RhotError
-from rhot_app.ui.backend.contract import Asker
+from rhot_app.ui.backend.contract import CommandClient, Connect
 from rhot_app.ui.backend.reader import Reader
 from rhot_app.ui.language import tr
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_page
@@ -50,23 +50,23 @@ class MovePage(Page):
 class EngineFeed(Reader):
     """Asks the engine one `command` again and again."""
 
-    def __init__(self, connect: Callable[[], Asker], command: str, period_s: float = ASK_S) -> None:
+    def __init__(self, connect: Connect, command: str, period_s: float = ASK_S) -> None:
         super().__init__()
         self._connect, self._command, self._period_s = connect, command, period_s
         self.answer: Answer = {"known": False}
         self.problem = ""
 
-    def step(self, asker: Asker) -> None:
+    def step(self, client: CommandClient) -> None:
         """Ask once; a failure becomes the problem."""
         try:
-            self.answer, self.problem = asker.command(self._command), ""
+            self.answer, self.problem = client.command(self._command), ""
         except RhotError as exc:
             self.problem = str(exc)
 
     def _run(self) -> None:
-        with contextlib.closing(self._connect()) as asker:
+        with contextlib.closing(self._connect()) as client:
             while not self._ending.is_set():
-                self.step(asker)
+                self.step(client)
                 self._ending.wait(self._period_s)
 
 

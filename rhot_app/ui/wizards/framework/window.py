@@ -130,8 +130,8 @@ class WizardWindow(ToolWindow):
         self.refresh()
 
     def _carry_out(self, step: AcceptStep, outcome: State) -> None:
-        with contextlib.closing(self._context.connect()) as asker:
-            (step.apply if outcome == "used" else step.take_back)(asker.command)
+        with contextlib.closing(self._context.connect()) as client:
+            (step.apply if outcome == "used" else step.take_back)(client.command)
 
     def _applied(self, step: AcceptStep, outcome: State) -> None:
         self._job = None

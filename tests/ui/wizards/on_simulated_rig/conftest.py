@@ -38,9 +38,9 @@ class SimulatedRig:
     def use(self, rig: Rig) -> None:
         """Replace the rig of the engine and of the file, for example by an uncalibrated one."""
         save_rig(self.path, rig)
-        asker = self.session.asker()
-        asker.command("set_rig", timeout_s=60.0, document=msgspec.to_builtins(rig))
-        asker.close()
+        client = self.session.command_client()
+        client.command("set_rig", timeout_s=60.0, document=msgspec.to_builtins(rig))
+        client.close()
 
     @property
     def saved(self) -> Rig:
@@ -67,7 +67,7 @@ def rig_launcher(themed: Any, simulated_rig: SimulatedRig) -> Iterator[Launcher]
     """What the Calibrate menu opens windows with, on the simulated rig; afterwards the rig is the true one again."""
     parent = QWidget()
     session = simulated_rig.session
-    launcher = Launcher(session.asker, session.client, lambda: DARK, FakeSettingsStore(), parent)
+    launcher = Launcher(session.command_client, session.client, lambda: DARK, FakeSettingsStore(), parent)
     yield launcher
     launcher.close()
     simulated_rig.use(simulated_rig.truth)

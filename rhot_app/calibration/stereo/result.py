@@ -1,4 +1,4 @@
-"""The report of a stereo calibration: every figure that a page, a JSON object or a check needs."""
+"""The result of a stereo calibration: every figure that a page, a JSON object or a check needs."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class StereoFigures:
 
 
 @dataclass(frozen=True, slots=True)
-class StereoReport:
+class StereoResult:
     """What came of a stereo calibration.
 
     `figures` are None when the cameras could not be put together; `dropped` shots with reasons; `summary` the sentence

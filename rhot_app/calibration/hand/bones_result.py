@@ -83,7 +83,7 @@ class RigidDistance:
 
 
 @dataclass(frozen=True, slots=True)
-class BonesReport:
+class BonesResult:
     """The result: a hand file and its uncertainty.
 
     `method`: "landmarks" (each bone's median), "movement" (all lengths from many markers), "reach" (size and reaches
