@@ -22,7 +22,7 @@ from rhot_app.engine.directory import EngineDirectory
 from rhot_app.engine.process import StartedProcess, start_ticks, started_processes
 from rhot_app.state import Condition
 
-README_PICTURE = Path(__file__).parents[2] / "docs" / "screenshots" / "demo.png"
+PICTURES = Path(__file__).parents[2] / "docs" / "screenshots"
 GRAB = """
 import sys
 from PySide6.QtGui import QGuiApplication
@@ -86,7 +86,7 @@ def test_the_demo_shows_a_moving_hand_and_survives_crashes(bench: Bench) -> None
         await_moving_hand(bench.folder)
         if os.environ.get("RHOT_UPDATE_SCREENSHOTS") == "1":
             states_of(client, 30.0)  # until the plots are full
-            grab(README_PICTURE)
+            grab(PICTURES / "demo.png")
 
         started = started_processes(EngineDirectory(bench.sockets))
         assert {process.role for process in started} >= {"engine"}
