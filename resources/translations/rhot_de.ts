@@ -4361,7 +4361,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>Loop from here</source>
-        <translation>Schleife ab hier</translation>
+        <translation>Schleife ab</translation>
     </message>
     <message>
         <source>The range that is repeated begins here ([).</source>
@@ -4369,7 +4369,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>to here</source>
-        <translation>bis hier</translation>
+        <translation>bis</translation>
     </message>
     <message>
         <source>The range that is repeated ends here (]).</source>
@@ -4734,6 +4734,42 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>Fingers that cross in the pictures: index and middle over each other, little and ring, the thumb across the palm, the hand edge on.</source>
         <translation>Finger, die sich in den Bildern kreuzen: Zeige- und Mittelfinger, Klein- und Ringfinger, der Daumen über der Handfläche, die Hand hochkant.</translation>
+    </message>
+    <message>
+        <source>BVH: a moving skeleton</source>
+        <translation>BVH: ein bewegtes Skelett</translation>
+    </message>
+    <message>
+        <source>C3D: points, motion capture</source>
+        <translation>C3D: Punkte, Motion Capture</translation>
+    </message>
+    <message>
+        <source>CSV: a table</source>
+        <translation>CSV: eine Tabelle</translation>
+    </message>
+    <message>
+        <source>glTF: an animated hand</source>
+        <translation>glTF: eine animierte Hand</translation>
+    </message>
+    <message>
+        <source>MCAP: for Foxglove</source>
+        <translation>MCAP: für Foxglove</translation>
+    </message>
+    <message>
+        <source>NPZ: NumPy&apos;s arrays</source>
+        <translation>NPZ: Arrays von NumPy</translation>
+    </message>
+    <message>
+        <source>Parquet: a table for analysis</source>
+        <translation>Parquet: eine Tabelle zum Auswerten</translation>
+    </message>
+    <message>
+        <source>MCAP: for ROS 2</source>
+        <translation>MCAP: für ROS 2</translation>
+    </message>
+    <message>
+        <source>TRC: points, for OpenSim</source>
+        <translation>TRC: Punkte, für OpenSim</translation>
     </message>
     <message>
         <source>Index</source>
@@ -5113,7 +5149,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>each marker its own settings</source>
-        <translation>jeder Marker mit eigenen Einstellungen</translation>
+        <translation>eigene Einstellungen je Marker</translation>
     </message>
     <message>
         <source>Otherwise all markers get the settings that serve the worst of them.</source>
@@ -6265,7 +6301,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>not picked</source>
-        <translation>nicht aufgenommen</translation>
+        <translation>fehlt noch</translation>
     </message>
     <message>
         <source>Read what may be mistaken for a marker, then go on.</source>
@@ -6277,7 +6313,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>Tell them apart</source>
-        <translation>Auseinanderhalten</translation>
+        <translation>Unterscheiden</translation>
     </message>
     <message>
         <source>No two colours overlap.</source>
@@ -6342,6 +6378,11 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     <message>
         <source>{rows} of {enough} or more</source>
         <translation>{rows} von {enough} oder mehr</translation>
+    </message>
+    <message>
+        <source>spread</source>
+        <comment>of distances</comment>
+        <translation>Spanne</translation>
     </message>
     <message>
         <source>from near to far: the farthest three times the nearest</source>
@@ -6409,7 +6450,7 @@ Von einer bloßen Hand: grün ihr Umriss, blau Konturen darin, rot die Kanten, d
     </message>
     <message>
         <source>not seen by both cameras</source>
-        <translation>nicht von beiden Kameras gesehen</translation>
+        <translation>nicht in beiden Bildern</translation>
     </message>
     <message>
         <source>Learn the empty scene and your hand first.</source>
@@ -7063,7 +7104,7 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     </message>
     <message>
         <source>Skip: lengths stay unproven</source>
-        <translation>Überspringen: Längen bleiben unbewiesen</translation>
+        <translation>Überspringen: Längen unbewiesen</translation>
     </message>
     <message>
         <source>Shows a ruler: its crosses are {length_mm:g} mm apart.</source>
@@ -7079,7 +7120,7 @@ Haken entfernen, um es der Kamera zu überlassen.</translation>
     </message>
     <message>
         <source>Lens to lens</source>
-        <translation>Objektiv zu Objektiv</translation>
+        <translation>Objektivabstand</translation>
     </message>
     <message>
         <source>Space. Then click both ends of the ruler in each picture.</source>

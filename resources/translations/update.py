@@ -19,9 +19,10 @@ SOURCES = [HERE.parents[1] / "rhot_app" / name for name in ("ui", "engine")]
 
 
 def shown_names() -> list[str]:
-    """What the window translates of the rest of `rhot_app`: calibrations, what they collect, motions, a hand's
-    numbers."""
+    """What the window translates of the rest of `rhot_app`: calibrations, what they collect, motions, formats
+    of the export, a hand's numbers."""
     from rhot_app.calibration.registry import calibrations
+    from rhot_app.export.formats import all_formats
     from rhot_app.hand.anatomy import load_hand
     from rhot_app.handfit.quantities import GROUPS, numbers_of
     from rhot_app.simulator.scene.shipped_motions import shipped_motions
@@ -29,8 +30,10 @@ def shown_names() -> list[str]:
     numbers = numbers_of(load_hand(HERE.parent / "hands" / "right.json"))
     collected = [part for wizard in calibrations() for part in wizard.collect]
     return [*(text for wizard in calibrations() for text in (wizard.title, wizard.meaning)),
-            *(text for part in collected for text in (part.title, part.sentence, getattr(part, "nothing", "")) if text),
-            *(text for motion in shipped_motions() for text in (motion.name, motion.description)), *GROUPS,
+            *(text for part in collected for name in ("title", "sentence", "nothing", "simulated")
+              if (text := getattr(part, name, ""))),
+            *(text for motion in shipped_motions() for text in (motion.name, motion.description)),
+            *(one.title for one in all_formats().values()), *GROUPS,
             *sorted({text for number in numbers for text in (number.name, number.meaning)})]
 
 

@@ -190,9 +190,13 @@ class Actions(QObject):
 class _ElidingLabel(QLabel):
     """One line of text at the right that ends in an ellipsis where the toolbar has no room for all of it."""
 
+    def sizeHint(self) -> QSize:  # noqa: N802
+        """No width of its own, only what the others leave: the menus are whole before it is."""
+        return QSize(0, super().sizeHint().height())
+
     def minimumSizeHint(self) -> QSize:  # noqa: N802
-        """No width at all: a toolbar hides its last widgets when the others cannot become narrower."""
-        return QSize(0, super().minimumSizeHint().height())
+        """The same: a toolbar hides its last widgets when the others cannot become narrower."""
+        return self.sizeHint()
 
     def paintEvent(self, event: object) -> None:  # noqa: N802
         """The text as far as it fits."""

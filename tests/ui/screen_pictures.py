@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,9 @@ def check(name: str, image: QImage, least_colours: int) -> None:
     assert path.exists(), f"{path} is missing; run this test with RHOT_UPDATE_SCREENSHOTS=1"
 
 
+_ICON_GAP_PX = 4  # between the icon of a cell and its text
+
+
 def cut_texts(window: QWidget) -> list[str]:
     """What cannot be read: texts of labels, buttons and tables in sight that their place does not hold, and parts that
     reach over the window's edge. What scrolls may be longer than its place."""
@@ -65,6 +69,10 @@ def cut_texts(window: QWidget) -> list[str]:
             place = QRect(part.mapTo(window, part.rect().topLeft()), part.size())
             if not scrolls and not window.rect().contains(place):
                 cut.append(f"{part.text()!r} reaches over the edge")
+            if scrolls and part.text() and part.visibleRegion().boundingRect().width() < part.width():
+                cut.append(f"{part.text()!r} is wider than what scrolls up and down")
+            if isinstance(part, QLabel) and part.wordWrap() and _widest_word(part) > part.contentsRect().width():
+                cut.append(f"{part.text()!r} has a word that is wider than its place")
         if isinstance(part, QLabel) and part.text() and not scrolls:
             needed = QSize(part.width(), part.heightForWidth(part.width())) if part.wordWrap() else part.sizeHint()
             if needed.height() > part.height() or needed.width() > part.width():
@@ -76,6 +84,12 @@ def cut_texts(window: QWidget) -> list[str]:
         elif isinstance(part, QTableView):
             cut += _cut_cells(part)
     return cut
+
+
+def _widest_word(label: QLabel) -> int:
+    """px; a word that no hyphen or tag divides."""
+    words = re.split(r"[\s\-–/]|<[^>]*>", label.text())
+    return max(label.fontMetrics().horizontalAdvance(word) for word in words)
 
 
 def _scrolls(part: QWidget, window: QWidget) -> bool:
@@ -102,7 +116,8 @@ def _cut_cells(table: QTableView) -> list[str]:
         for column in range(model.columnCount()):
             cell = model.index(row, column)
             if text := cell.data():
-                room = QRect(0, 0, table.columnWidth(column) - padding, 10_000)
+                icon = table.iconSize().width() + _ICON_GAP_PX if cell.data(Qt.ItemDataRole.DecorationRole) else 0
+                room = QRect(0, 0, table.columnWidth(column) - padding - icon, 10_000)
                 font = cell.data(Qt.ItemDataRole.FontRole) or table.font()
                 needed = QFontMetrics(font).boundingRect(room, Qt.TextFlag.TextWordWrap, text)
                 if needed.height() > table.rowHeight(row) or needed.width() > room.width():

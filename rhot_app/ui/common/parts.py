@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QMessageBox, QPushButton, QScrollArea, QWidget
+from PySide6.QtWidgets import QFileDialog, QLabel, QMessageBox, QPushButton, QScrollArea, QWidget
 
 from rhot_app.ui.language import tr
 
@@ -19,6 +19,18 @@ def plain_button(text: str, meaning: str = "", clicked: Callable[[], object] | N
     if clicked is not None:
         button.clicked.connect(clicked)
     return button
+
+
+def keep_width(part: QPushButton | QLabel, *words: str) -> None:
+    """As wide as its longest text, whichever of these it shows: nothing beside it moves or is cut when it changes."""
+    shown = part.text()
+    part.ensurePolished()
+    widths = []
+    for word in words:
+        part.setText(word)
+        widths.append(part.sizeHint().width())
+    part.setText(shown)
+    part.setMinimumWidth(max(widths))
 
 
 def scrolled(widget: QWidget) -> QScrollArea:

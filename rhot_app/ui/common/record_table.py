@@ -150,3 +150,13 @@ class RecordTable(QTableView, Generic[R]):
         """Every column as wide as its longest text, the last one as wide as the room that is left."""
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.horizontalHeader().setStretchLastSection(True)
+
+    def fill_width(self) -> None:
+        """The first column, which says what a row is about, as wide as its longest text; the others share the rest."""
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.records_model.modelReset.connect(self._keep_names_whole)
+        self._keep_names_whole()
+
+    def _keep_names_whole(self) -> None:
+        if self.records_model.columns:
+            self.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)

@@ -124,6 +124,7 @@ class AboutDialog(QDialog):
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.show_records(parts())
         self.table.fit_columns()
+        self.table.horizontalHeader().setStretchLastSection(False)  # some licences are longer than the window is wide
         self.tabs = QTabWidget()
         self.tabs.addTab(self.versions, tr("Versions"))
         self.tabs.addTab(self.table, tr("Licences"))

@@ -32,6 +32,7 @@ from rhot_app.export.states import HandStates, columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
+from rhot_app.ui.common.parts import keep_width
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import newest_recording
@@ -40,7 +41,7 @@ from rhot_app.ui.language import tr, tr_noop
 ROWS = 8
 LOOK_MS = 300  # a choice is looked at when it has stood for a while
 
-_SIZE, _BUTTON_PX = (860, 600), 120
+_SIZE = (860, 600)
 _OWN_RATE, _NO_FILL = tr_noop("as recorded"), tr_noop("leave gaps")
 _TRACKERS = ((tr_noop("as recorded"), None), (tr_noop("classic"), "classic"), (tr_noop("estimator"), "estimator"))
 _FRAMES = ((tr_noop("rig"), "rig"), (tr_noop("wrist, along the palm's axes"), "wrist"))
@@ -102,7 +103,7 @@ class ExportDialog(QDialog):
         self.bar.setRange(0, 1000)
         self.bar.hide()
         self.export_button = QPushButton(tr("Export …"))
-        self.export_button.setFixedWidth(_BUTTON_PX)  # it says Cancel meanwhile
+        keep_width(self.export_button, tr("Export …"), tr("Cancel"))
         self.export_button.setToolTip(tr("Choose a file; it appears when it is whole."))
         self.export_button.setDefault(True)
         self.close_button = QPushButton(tr("Close"))

@@ -31,7 +31,6 @@ class NetworksDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle(tr("Hand networks"))
         self.setProperty("guide", "tracker")
-        self.setFixedWidth(_WIDTH_PX)
         self._install = install
         self._job: Job | None = None
         meaning = QLabel(tr(_MEANING, licence=LICENCE, package=PACKAGE))
@@ -63,6 +62,7 @@ class NetworksDialog(QDialog):
         buttons.addStretch(1)
         buttons.addWidget(self.close_button)
         layout.addLayout(buttons)
+        self.setFixedWidth(max(_WIDTH_PX, layout.minimumSize().width()))
         self._start(lambda progress: state_sentence(user_folder()), self._show)
 
     def install(self, wheel: Path | None = None) -> None:

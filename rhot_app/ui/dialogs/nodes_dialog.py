@@ -288,7 +288,7 @@ class PairDialog(QDialog):
         for widget in (intro, self.code, self.verdict):
             layout.addWidget(widget)
         layout.addLayout(buttons)
-        self.resize(600, 340)
+        self.resize(600, max(340, layout.totalHeightForWidth(600)))
         self.code.setFocus()
 
     def _show_whether_complete(self) -> None:

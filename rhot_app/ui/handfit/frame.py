@@ -114,13 +114,13 @@ class FitFrame:
             self._wall.addWidget(view, 1)
         side.setSpacing(8)
         side.addWidget(self.form, 1)
-        freedom, spread, fits, frees = QHBoxLayout(), QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
+        freedom, spread, fits, frees = QHBoxLayout(), QHBoxLayout(), QVBoxLayout(), QHBoxLayout()
         freedom.addWidget(QLabel(tr("Change")))
         freedom.addWidget(self.freedom_box, 1)
         spread.addWidget(QLabel(tr("Anchors ±")))
         spread.addWidget(self.sd_box, 1)
-        for part in (self.anchors_button, self.contours_button):
-            fits.addWidget(part, 1)
+        for part in (self.anchors_button, self.contours_button):  # German has no room for both beside each other
+            fits.addWidget(part)
         for part in (self.free_button, self.reset_button):
             frees.addWidget(part, 1)
         side.addLayout(freedom)

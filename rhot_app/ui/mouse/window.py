@@ -19,7 +19,7 @@ from rhot_app.project import Rig
 from rhot_app.state import HandState
 from rhot_app.ui.backend.contract import Listener
 from rhot_app.ui.backend.live import SILENCE_S
-from rhot_app.ui.common.parts import plain_button
+from rhot_app.ui.common.parts import keep_width, plain_button
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.common.theme import app_font
@@ -83,11 +83,14 @@ class MouseWindow(ToolWindow):
         self.badge = StateBadge(scheme)
         self.place = QLabel()
         self.place.setFont(app_font(_READOUT_PT))
+        keep_width(self.place, tr("right {right:+4.0f} mm   forward {forward:+4.0f} mm   height {height:3.0f} mm",
+                                  right=-888, forward=-888, height=888))
         self.place.setToolTip(tr("Cursor: right and forward of the ground's middle, and above it."))
         self.shapes = {button: QLabel() for button in BUTTONS}
         self.words = {button: QLabel() for button in BUTTONS}
         for button, label in self.words.items():
             label.setFont(app_font(_READOUT_PT))
+            keep_width(label, *(f"{tr(_NAMES[button])} {word}" for word in (tr("DOWN"), tr("up"))))
             label.setToolTip(tr("Pressed while the {finger} is spread away from the hand.", finger=tr(button)))
         self.sentence = Sentence(2)
 
@@ -201,7 +204,7 @@ class MouseWindow(ToolWindow):
         if self.state is None:
             return tr(NO_ENGINE)
         if self.state.needs:
-            return self.state.needs[0]
+            return tr(self.state.needs[0])
         if self.test is not None:
             found = self.test.result()
             done = tr("Move the cursor's foot into the blue target and spread the thumb.")

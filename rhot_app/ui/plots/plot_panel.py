@@ -288,7 +288,7 @@ class PlotPanel(QWidget):
     def _style_plot(self) -> None:
         self.plot.setBackground(self._scheme.panel)
         self.plot.hideButtons()
-        self.plot.setMinimumHeight(80)
+        self.plot.setMinimumHeight(72)
         item = self.plot.getPlotItem()
         item.showGrid(x=True, y=True, alpha=0.25)
         item.setXRange(-SPAN_S, 0.0, padding=0.0)

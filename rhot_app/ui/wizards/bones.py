@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QBrush, QColor
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QLabel, QWidget
 
 from rhot_app.calibration.collect import Bar, Guide, Movement
 from rhot_app.calibration.hand.bones import BONE_NAMES, enter_bones
@@ -216,7 +216,7 @@ def knowledge_of(bone: BoneLength) -> str:
 
 _SIDES = (("right", tr_noop("Right hand")), ("left", tr_noop("Left hand")))
 _ROW_PX = 30
-_BOX_PX = 120
+_BOX_PX = 104
 _LONGEST_MM = 400.0
 _ALPHA = {"measured": 150, "inferred": 60, "guessed": 110}
 
@@ -256,7 +256,7 @@ class EntryPage(Page):
             label.setWordWrap(True)
             grid.addWidget(label, 0, column)
         for row, finger in enumerate(FINGERS):
-            grid.addWidget(QLabel(finger), row + 1, 0)
+            grid.addWidget(QLabel(tr(finger)), row + 1, 0)
             for k, name in enumerate(BONE_NAMES[3 * row:3 * row + 3]):
                 grid.addWidget(self.boxes[name], row + 1, k + 1)
         grid.setRowStretch(len(FINGERS) + 1, 1)
@@ -269,10 +269,10 @@ class EntryPage(Page):
         box.setSuffix(" mm")
         box.setSpecialValueText("–")
         box.setKeyboardTracking(False)
-        box.setAccessibleName(name)
+        box.setAccessibleName(tr(name.replace(".", " ")))
         box.setMinimumWidth(_BOX_PX)
         box.setToolTip(tr("{name}: from the middle of one joint to that of the next, finger bent. {usual:.0f} mm in "
-                          "the hand now in use.", name=name.replace(".", ", "), usual=self._entry.usual(name)))
+                          "the hand now in use.", name=tr(name.replace(".", " ")), usual=self._entry.usual(name)))
         box.valueChanged.connect(lambda value: self._take(name, value))
         return box
 
@@ -334,7 +334,7 @@ class HandPage(Page):
         self._show_bones()
         self.reaches.setText("" if result is None else tr("Reach: ")
                              + ", ".join(
-            f"{reach.finger} {reach.length_mm:.0f} ± {reach.std_mm:.0f}" for reach in result.reaches) + " mm")
+            f"{tr(reach.finger)} {reach.length_mm:.0f} ± {reach.std_mm:.0f}" for reach in result.reaches) + " mm")
 
     def _show_bones(self) -> None:
         result, report = self._shown, self._hand.report
@@ -345,10 +345,7 @@ class HandPage(Page):
         *columns, last = figure_columns(report.tables[0].heads)
         last = replace(last, roles=lambda row: {Qt.ItemDataRole.BackgroundRole: brushes[row[0]]})
         self.table.show_records(report.tables[0].texts, (*columns, last))
-        header = self.table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        for column in range(1, len(columns)):
-            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        self.table.fit_columns()
 
     def _brush(self, knowledge: str) -> QBrush:
         guessed = knowledge == "guessed"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QHeaderView, QLabel
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFormLayout, QLabel
 
 from rhot_app.calibration.depth.fit import LEAST_ROWS, DepthResult, fit_depth, geometry_of, replaced_calibration
 from rhot_app.calibration.depth.table import DepthRow, DepthTable
@@ -18,6 +18,7 @@ from rhot_app.ui.backend.feed import Picture, StateFeed
 from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.language import tr, tr_noop
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.drawing import Callout, Dots
 from rhot_app.ui.wizards.framework.page import ChartPage, Page, shrinkable
@@ -92,7 +93,7 @@ class DistanceStep(Step):
     def capture(self) -> bool:
         """Take the distance entered with the disparity seen; whether it could be."""
         seen = self.disparities()
-        name = self.rig.markers.ids[self.marker]
+        name = marker_name(self.rig.markers.ids[self.marker])
         self.problem = ""
         if len(seen) < _LEAST_STATES:
             self.problem = (tr("The marker {name} is not seen by both cameras. Start tracking, and hold it into both "
@@ -137,7 +138,8 @@ class DistanceStep(Step):
         """What to do next, and how many distances there are."""
         bars = (Bar(tr("distances"), min(len(self.rows) / ENOUGH, 1.0),
                     tr("{rows} of {enough} or more", rows=len(self.rows), enough=ENOUGH)),
-                Bar(tr("spread"), self._spread(), tr("from near to far: the farthest three times the nearest")))
+                Bar(tr("spread", "of distances"), self._spread(),
+                    tr("from near to far: the farthest three times the nearest")))
         enough = all(bar.full for bar in bars)
         return StepView(self._sentence(), done=self.result is not None and enough,
                         hint=self.problem or ("" if self.rows else self._warning), bars=bars,
@@ -150,7 +152,7 @@ class DistanceStep(Step):
         if not mark.found:
             return AnnotatedPicture(picture)
         return AnnotatedPicture(picture, (Dots(np.array([[mark.x, mark.y]])),
-                                          Callout(mark.x, mark.y, self.rig.markers.ids[self.marker])))
+                                          Callout(mark.x, mark.y, marker_name(self.rig.markers.ids[self.marker]))))
 
     def _sentence(self) -> str:
         if not self.rows:
@@ -183,7 +185,7 @@ class DistancePage(Page):
         self._states = states
         self._shown: list[DepthRow] = []
         self.marker = QComboBox()
-        self.marker.addItems(list(step.rig.markers.ids))
+        self.marker.addItems([marker_name(one) for one in step.rig.markers.ids])
         self.marker.setToolTip(tr("The marker that is held at the distance."))
         self.marker.currentIndexChanged.connect(self._choose)
         self.distance = QDoubleSpinBox()
@@ -202,7 +204,7 @@ class DistancePage(Page):
         form.addRow(tr("Disparity"), self.seen)
         self.table = RecordTable(_columns())
         self.table.setToolTip(tr("Distance, mean disparity and its spread within the second."))
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.table.fill_width()
         self.remove_button = plain_button(tr("Remove the chosen row"), clicked=self._remove)
         self.table.chosen_changed.connect(self._show_removable)
         self.column.addLayout(form)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QFormLayout, QHeaderView, QLabel
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QFormLayout, QLabel
 
 from rhot_app.calibration.collect import Bar, Movement
 from rhot_app.calibration.filters.meters import BRISK_M_S, MOVING_M_S, FilterMeter, FilterTargets, MeterReading
@@ -260,7 +260,7 @@ class MeterPage(MovementPage):
         self._meters = meters
         self.table: RecordTable[tuple[str, ...]] = RecordTable(
             [Column(tr(head), itemgetter(cell), number=cell > 0) for cell, head in enumerate(_HEADS)], selectable=False)
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.table.fill_width()
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.table.setShowGrid(False)
         self.table.setToolTip(tr("Of the last two seconds: jitter without filters and, at rest, with those in force, "

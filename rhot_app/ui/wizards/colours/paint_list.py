@@ -14,6 +14,7 @@ from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.shapes import shape_pixmap
 from rhot_app.ui.language import tr
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.wizards.framework.swatches import ARROW_PX, CHIP, Rgb, change_of, swatch
 
 _TICK_PX = 28
@@ -40,12 +41,14 @@ class PaintList(RecordTable[PaintRow]):
 
     def __init__(self, scheme: Scheme, heads: tuple[str, str]) -> None:
         super().__init__((Column("", lambda row: "", roles=self._state),
-                          Column(tr(heads[0]), attrgetter("name"), roles=self._patch),
-                          Column(tr(heads[1]), attrgetter("text"))))
+                          Column(tr(heads[0]), lambda row: marker_name(row.name), roles=self._patch),
+                          Column(tr(heads[1]), attrgetter("text"), roles=lambda row: {
+                              Qt.ItemDataRole.ToolTipRole: row.text})))
         self._scheme = scheme
         self._filling = False
-        self.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
-        self.horizontalHeader().setSectionResizeMode(2, QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setStretchLastSection(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setColumnWidth(0, _TICK_PX)
         self.verticalHeader().setDefaultSectionSize(_ROW_PX)
         self.setShowGrid(False)

@@ -13,6 +13,7 @@ from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.common.parts import plain_button
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.wizards.colours.masks import MaskChoice, MaskedPictures, MaskMaker, Show, annotated_by_masks, drift_of
 from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow
 from rhot_app.ui.wizards.framework.page import Page, shrinkable
@@ -147,23 +148,26 @@ class PickStep(Step):
             return tr("as skin")
         same = [pair for pair in self.identity.same if name in pair[:2]]
         if same:
-            return tr("as {other}", other=same[0][1] if same[0][0] == name else same[0][0])
-        return next((tr("was {other}'s", other=other) for marker, other in self.identity.taken if marker == name), "")
+            return tr("as {other}", other=marker_name(same[0][1] if same[0][0] == name else same[0][0]))
+        return next((tr("was {other}'s", other=marker_name(other)) for marker, other in self.identity.taken
+                     if marker == name), "")
 
     def _verdict(self) -> Verdict | None:
         """What is wrong with the colours picked so far; None when nothing is."""
         again = tr("Click the right paint; Ctrl+Z takes the last click back.")
-        findings = [Finding("skin", Grade.POOR, tr("{name} has the colour of skin: {shown}.", name=name, shown=shown),
+        findings = [Finding("skin", Grade.POOR, tr("{name} has the colour of skin: {shown}.",
+                                                        name=marker_name(name), shown=shown),
                             "", again) for name, shown in self.identity.skin.items()]
         findings += [Finding("same-colour", Grade.POOR, tr("{first} and {second} have one colour: their hues are "
-                                                           "{apart:.0f}° apart.", first=first, second=second,
-                                                           apart=apart), "", again) for first, second,
-                     apart in self.identity.same]
+                                                           "{apart:.0f}° apart.", first=marker_name(first),
+                                                           second=marker_name(second), apart=apart), "", again)
+                     for first, second, apart in self.identity.same]
         if self.identity.exchanged:
             findings.append(Finding("exchanged", Grade.FAIR, self.identity.exchanged, "",
                                     tr("If the hand does not wear them so, click these again.")))
         doubtful = [name for name in self.base.ids if self.doubt(name)]
-        return judge(tr("look at {names} again.", names=", ".join(doubtful)), findings) if findings else None
+        again = tr("look at {names} again.", names=", ".join(map(marker_name, doubtful)))
+        return judge(again, findings) if findings else None
 
     @property
     def _wrong(self) -> str:
@@ -189,18 +193,19 @@ class PickStep(Step):
         if len(self.gathering.names) < len(self.base.ids):
             return tr("Click {paint}, or drag over it.", paint=self._paint())
         if self._wrong:
-            return tr("Choose {marker} and click its paint.", marker=self._wrong)
+            return tr("Choose {marker} and click its paint.", marker=marker_name(self._wrong))
         if not self.gathering.enough:
             return tr("Move and turn the hand slowly, near and far.")
         return tr("Enough: press Next.")
 
     def _paint(self) -> str:
-        return tr("bare skin") if self.chosen == SKIN else tr("the paint of {chosen}", chosen=self.chosen)
+        return tr("bare skin") if self.chosen == SKIN else tr(
+            "the paint of {chosen}", chosen=marker_name(self.chosen))
 
     def _hint(self) -> str:
         if self._wrong:
             return tr("{marker} cannot stay so: choose its line and click its paint, or press Ctrl+Z.",
-                      marker=self._wrong)
+                      marker=marker_name(self._wrong))
         if self.gathering.names and not len(self.gathering.skin):
             return tr("Pick bare skin too: then it is said whether a marker looks like it.")
         drift = () if self.gathering.names else drift_of(self._masked)
@@ -208,13 +213,13 @@ class PickStep(Step):
             return tr("By the rig's colours: {figure}", figure=drift[0].figure)
         if not self.gathering.names:
             return tr("Space holds the pictures, if your hands are full.")
-        unseen = [tr("{camera} has not seen {name}: {why}", camera=camera, name=name,
+        unseen = [tr("{camera} has not seen {name}: {why}", camera=camera, name=marker_name(name),
                      why=picture.why(self.base.ids.index(name))) for camera,
                   picture in self._masked.items() for name in self.gathering.unseen_by(camera)
                   if picture.why(self.base.ids.index(name))]
         if unseen:
             return unseen[0]
-        missing = [name for name in self.gathering.names if self.gathering.variety(name) < 1.0]
+        missing = [marker_name(name) for name in self.gathering.names if self.gathering.variety(name) < 1.0]
         return tr("Still to be seen in other places: {names}.", names=", ".join(missing)) if missing else ""
 
     def _annotated(self) -> dict[str, AnnotatedPicture]:

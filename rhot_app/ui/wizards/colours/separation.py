@@ -9,7 +9,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QHeaderView, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from rhot_app.calibration.colour.colours import ColourResult
 from rhot_app.calibration.colour.verdict import OVERLAP
@@ -89,7 +89,7 @@ class SeparationPage(Page):
         self.charts = ChartView(scheme)
         self.table: RecordTable[ColourShares] = RecordTable((), selectable=False)
         self.table.verticalHeader().setDefaultSectionSize(_ROW_PX)
-        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.table.fill_width()
         self.table.setAccessibleName(tr("Which colour is taken for which"))
         self.table.setWordWrap(False)
         self.table.setStyleSheet("QHeaderView::section { padding: 4px 0 } QTableView::item { padding: 0 }")
@@ -125,9 +125,8 @@ class SeparationPage(Page):
             columns.append(Column(head, partial(self._text, number), roles=partial(self._roles, number)))
         self.table.show_records([(name, number, shares) for number, (name, shares) in
                                  enumerate(zip(names, result.separability.matrix.tolist(), strict=True))], columns)
-        header = self.table.horizontalHeader()
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        self.table.setFixedHeight(header.sizeHint().height() + _ROW_PX * len(names) + 4)
+        header = self.table.horizontalHeader().sizeHint().height()
+        self.table.setFixedHeight(header + _ROW_PX * len(names) + 4)
 
     @staticmethod
     def _text(column: int, row: ColourShares) -> str:

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from rhot_app.ui.common.parts import keep_width
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.common.shapes import ShapeMark, paint_shape
 from rhot_app.ui.common.theme import TEXT_PT, app_font
@@ -89,11 +90,8 @@ class WizardFrame:
     def _keep_width(self, definition: Definition) -> None:
         """Next is as wide as its longest word, so that Back never comes under a mouse that presses it."""
         steps = [page.step for page in definition.pages]
-        words = {tr("Next"), tr("Close"), *(tr(step.use_label) for step in steps if isinstance(step, AcceptStep))}
-        self.next_button.ensurePolished()
-        for word in sorted(words, key=len):
-            self.next_button.setText(word)
-            self.next_button.setMinimumWidth(max(self.next_button.minimumWidth(), self.next_button.sizeHint().width()))
+        keep_width(self.next_button, tr("Next"), tr("Close"),
+                   *(tr(step.use_label) for step in steps if isinstance(step, AcceptStep)))
 
     def _lay_out(self, parent: QWidget) -> None:
         right = QVBoxLayout()

@@ -251,7 +251,7 @@ class Movements:
                 movement: Movement) -> PageT:
         """The same on a page that shows more."""
         page = make(self.add(MovementStep(movement, self.folder, self.states.recent)), self._connect, self.states)
-        page.twin_facts = movement.simulated
+        page.twin_facts = tr(movement.simulated)
         return page
 
     def add(self, step: StepT) -> StepT:

@@ -162,7 +162,7 @@ class FigureTable(RecordTable[tuple[str, ...]]):
         self._count = columns
         self._shown: Table | None = None
         self.setShowGrid(False)
-        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.fill_width()
 
     def show_table(self, table: Table | None) -> None:
         """Show it instead of the last one; the same object is not filled in again."""
