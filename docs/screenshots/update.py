@@ -63,7 +63,7 @@ def main() -> int:
         print(*(f"{name}: {', '.join(takers[name])}" for name in names), sep="\n")
         return 0
     ids = sorted({test for name in names for test in takers[name]}, key=lambda one: ("on_simulated_rig" in one, one))
-    return subprocess.run([sys.executable, "-m", "pytest", "-q", "--studies", *ids], cwd=ROOT, check=False,
+    return subprocess.run([sys.executable, "-m", "pytest", "-q", "--studies=all", *ids], cwd=ROOT, check=False,
                           env={**os.environ, "RHOT_UPDATE_SCREENSHOTS": "1"}).returncode
 
 
