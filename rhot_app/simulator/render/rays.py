@@ -35,8 +35,9 @@ def light_direction(camera: CameraModel) -> Array:
 
 
 @njit(cache=True, fastmath=True)
-def scatter(x: int, y: int, slots: int, seed: int, rays: Array, ray: Array, slot: Indices) -> None:
-    """Fill a pixel's 16 rays (SAMPLES, 2) and their moments (SAMPLES,), 0 .. slots - 1 (a power of two up to 16)."""
+def scatter(x: int, y: int, slots: int, seed: int, rays: Array, ray: Array, slot: Indices, first: int) -> None:
+    """Fill a pixel's 16 rays, from row `first` of `ray` (R, 2) on, and their moments `slot` (R,), 0 .. slots - 1 (a
+    power of two up to 16)."""
     random = _hash(x, y, seed)
     shift_x, shift_y = (random & 0xFFFF) / 65536.0, ((random >> 16) & 0xFFFF) / 65536.0
     shift_t = (random >> 32) & (SAMPLES - 1)
@@ -46,9 +47,9 @@ def scatter(x: int, y: int, slots: int, seed: int, rays: Array, ray: Array, slot
     for k in range(SAMPLES):
         ox = (k + shift_x) / SAMPLES - 0.5
         oy = (((_STEP_Y * k) & (SAMPLES - 1)) + shift_y) / SAMPLES - 0.5
-        ray[k, 0] = rays[j, i, 0] + ox * xx + oy * xy
-        ray[k, 1] = rays[j, i, 1] + ox * yx + oy * yy
-        slot[k] = (_STEP_T * k + shift_t) & (slots - 1)
+        ray[first + k, 0] = rays[j, i, 0] + ox * xx + oy * xy
+        ray[first + k, 1] = rays[j, i, 1] + ox * yx + oy * yy
+        slot[first + k] = (_STEP_T * k + shift_t) & (slots - 1)
 
 
 @njit(cache=True)

@@ -58,7 +58,7 @@ def trace_sheet(series: Array, printed: Print, rays: Array, timing: Array, movin
         for x in range(box[0], box[2]):
             level = _level_around(printed, maps, slots, rays, x, y)
             if level == _LINES:
-                scatter(x, y, slots, seed, rays, ray, slot)
+                scatter(x, y, slots, seed, rays, ray, slot, 0)
                 _gather(printed, maps, ray, slot, shade, colour, background, image, x, y)
             elif level != _HIDDEN:
                 for c in range(3):

@@ -149,9 +149,8 @@ def trace(moving: Moving, view: View, canvas: Canvas, seed: int) -> tuple[int, i
 
 
 class Batch(NamedTuple):
-    """SAMPLES rays: directions `ray` (SAMPLES, 2) and moments `slot` (SAMPLES,), what each has `met` (SAMPLES, 2) - a
-    solid or -1, and a bit mask of all markers on the ray, hidden or not - and at what `depth` (SAMPLES,) m; `tied`:
-    margins of paint by group, m."""
+    """R rays: directions `ray` (R, 2) and moments `slot` (R,), what each has `met` (R, 2) - a solid or -1, and a bit
+    mask of all markers on the ray, hidden or not - and at what `depth` (R,) m; `tied`: margins of paint by group, m."""
 
     ray: Array
     slot: Indices
@@ -162,8 +161,10 @@ class Batch(NamedTuple):
 
 @njit(cache=True)
 def _empty_batch() -> Batch:
-    return Batch(np.empty((SAMPLES, 2)), np.zeros(SAMPLES, np.int64), np.zeros((SAMPLES, 2), np.int64),
-                 np.zeros(SAMPLES), np.zeros(REST_GROUP + 1))
+    """Room for a block of SAMPLES pixels that are all sampled again."""
+    rays = SAMPLES * SAMPLES
+    return Batch(np.empty((rays, 2)), np.zeros(rays, np.int64), np.zeros((rays, 2), np.int64), np.zeros(rays),
+                 np.zeros(REST_GROUP + 1))
 
 
 @njit(cache=True, fastmath=True, inline="always")
@@ -223,9 +224,10 @@ def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: i
     _, _, ids, masks, edges, scanline_bounds, rows, visible, whole = canvas
     slots, count = SAMPLES if np.max(sweep) > STILL_PX else 1, len(sweep)
     row, prepared, batch = np.empty(PARAMETERS), np.empty((slots, count, PREPARED)), _empty_batch()
-    active, near = np.empty(count, np.int64), np.empty(count, np.int64)
+    ray, slot = batch.ray, batch.slot
+    active, near, columns = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(SAMPLES, np.int64)
     for y in range(top, bottom):
-        actives, nears, block = 0, 0, -1
+        actives = 0
         for n in range(count):
             if scanline_bounds[y, n, 0] < scanline_bounds[y, n, 1]:
                 active[actives] = n
@@ -234,25 +236,28 @@ def _trace_edges(moving: Moving, view: View, canvas: Canvas, top: int, bottom: i
                     offset = ((k + 0.5) / slots - 0.5) * timing[2]
                     evaluate(series, n, timing[0] + y * timing[1] + offset, row)
                     prepare(what[n, KIND], row, size, prepared, k, n)
-        for x in range(rows[y, 0], rows[y, 1]):
-            if not edges[y, x]:
+        for start in range(rows[y, 0] // SAMPLES * SAMPLES, rows[y, 1], SAMPLES):
+            pixels = 0
+            for x in range(max(start, rows[y, 0]), min(start + SAMPLES, rows[y, 1])):
+                if edges[y, x]:
+                    scatter(x, y, slots, seed, rays, ray, slot, pixels * SAMPLES)
+                    columns[pixels] = x
+                    pixels += 1
+                    continue
                 if ids[y, x] >= PAINT_ID:
                     visible[ids[y, x] - PAINT_ID] += 1.0
                 if masks[y, x]:
                     _count(masks[y, x], 1.0, whole)
-                continue
-            if x // SAMPLES != block:
-                block = x // SAMPLES
-                nears = in_block(active, actives, scanline_bounds, y, block * SAMPLES, near)
-            scatter(x, y, slots, seed, rays, batch.ray, batch.slot)
-            _cast(int(SAMPLES), batch, near, nears, prepared, solids)
-            _gather(x, y, batch, prepared, solids, view, canvas)
+            if pixels:
+                nears = in_block(active, actives, scanline_bounds, y, start, near)
+                _cast(pixels * SAMPLES, batch, near, nears, prepared, solids)
+                _gather(y, columns, pixels, batch, prepared, solids, view, canvas)
 
 
 @njit(cache=True, fastmath=True)
 def _cast(rays: int, batch: Batch, near: Indices, nears: int, prepared: Array, solids: Solids) -> None:
     """What each of the first `rays` rays meets of the first `nears` solids of `near`. Many rays in one call, because
-    every call counts references of all its arrays."""
+    every call counts references of all its arrays, as those of `_gather` do."""
     ray, slot, met, depth, tied = batch
     what, _, _, margin, paint = solids
     for i in range(rays):
@@ -293,31 +298,35 @@ def _shade(kind: int, prepared: Array, slot: int, n: int, x: float, y: float, t:
 
 
 @njit(cache=True, fastmath=True)
-def _gather(x: int, y: int, batch: Batch, prepared: Array, solids: Solids, view: View, canvas: Canvas) -> None:
-    """The mean colour of the pixel's 16 rays, and its share in the markers' areas."""
+def _gather(y: int, columns: Indices, pixels: int, batch: Batch, prepared: Array, solids: Solids, view: View,
+            canvas: Canvas) -> None:
+    """The mean colours of the first `pixels` of a row's `columns`, of 16 rays each, and their share in the markers'
+    areas."""
     ray, slot, met, depth, _ = batch
     what, _, rgb, _, paint = solids
     _, _, _, light, shading = view
     background, image, _, _, _, _, _, visible, whole = canvas
-    red, green, blue = 0.0, 0.0, 0.0
-    for k in range(SAMPLES):
-        n, mask = met[k, 0], met[k, 1]
-        if mask:
-            _count(mask, 1.0 / SAMPLES, whole)
-        if n < 0:
-            red += background[0, y, x]
-            green += background[1, y, x]
-            blue += background[2, y, x]
-            continue
-        if what[n, MARKER] >= 0:
-            visible[what[n, MARKER]] += 1.0 / SAMPLES
-        shade = _shade(what[n, KIND], prepared, slot[k], n, ray[k, 0], ray[k, 1], depth[k], paint, light, shading)
-        red += shade * rgb[n, 0]
-        green += shade * rgb[n, 1]
-        blue += shade * rgb[n, 2]
-    image[0, y, x] = red / SAMPLES
-    image[1, y, x] = green / SAMPLES
-    image[2, y, x] = blue / SAMPLES
+    for i in range(pixels):
+        x = columns[i]
+        red, green, blue = 0.0, 0.0, 0.0
+        for k in range(i * SAMPLES, (i + 1) * SAMPLES):
+            n, mask = met[k, 0], met[k, 1]
+            if mask:
+                _count(mask, 1.0 / SAMPLES, whole)
+            if n < 0:
+                red += background[0, y, x]
+                green += background[1, y, x]
+                blue += background[2, y, x]
+                continue
+            if what[n, MARKER] >= 0:
+                visible[what[n, MARKER]] += 1.0 / SAMPLES
+            shade = _shade(what[n, KIND], prepared, slot[k], n, ray[k, 0], ray[k, 1], depth[k], paint, light, shading)
+            red += shade * rgb[n, 0]
+            green += shade * rgb[n, 1]
+            blue += shade * rgb[n, 2]
+        image[0, y, x] = red / SAMPLES
+        image[1, y, x] = green / SAMPLES
+        image[2, y, x] = blue / SAMPLES
 
 
 @njit(cache=True)
