@@ -23,7 +23,9 @@ RING = 2  # chroma pixels around the half level that an edge may reach (lens, 2x
 HOLES_MAX = 0.3  # holes (glints, noise) are filled up to this fraction of the component
 REACH = 5  # half-width of the neighbourhood that paint and surroundings are averaged over
 PAD = RING + REACH  # region around the component that coverage needs
-CLIP = 0.5  # coverage is clipped to -CLIP..1 + CLIP: noise must stay unbiased, glints must not count
+CLIP = 0.25
+"""Coverage is clipped to -CLIP..1 + CLIP: noise must stay unbiased, glints and other paints must not count. Two
+standard deviations of the most noise that an outline is fitted in (`follow.NOISE_MOST`)."""
 CONTRAST_MIN = 0.3  # of the marker's level; with less between paint and surroundings an edge cannot be unmixed
 FLATNESS = 4.0  # grey levels^2 that surroundings are taken to vary by at least, in every channel
 PIXELS_LEAST = 4  # pixels that are all paint: fewer show no colour and no shading to rely on
