@@ -72,7 +72,8 @@ class HandState:
     marker_ids: tuple[str, ...]
     marker_positions: Array  # (M, 3) m, filtered
     marker_raw_positions: Array  # (M, 3) m, triangulated, unfiltered
-    marker_covariances: Array  # (M, 3, 3) m^2, of the position (classic tracker: of the unfiltered one)
+    marker_covariances: Array  # (M, 3, 3) m^2, of the position (classic tracker: of the unfiltered one). All
+    # covariances of places have the calibration's error in a state that is published (docs/states.md)
     marker_knowledge: Codes  # (M,) Knowledge
     camera_names: tuple[str, ...]
     camera_pixels: Array  # (C, M, 2) px, last observation; NaN when lost

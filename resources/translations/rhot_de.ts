@@ -1586,10 +1586,6 @@ http://192.168.1.20:8080/video oder rtsp://192.168.1.21/live</translation>
         <translation>± {spread} mm (ein Sigma)</translation>
     </message>
     <message>
-        <source>, {more:.2f} mm of it by the calibration</source>
-        <translation>, davon {more:.2f} mm durch die Kalibrierung</translation>
-    </message>
-    <message>
         <source>At least: {reason}</source>
         <translation>Mindestens: {reason}</translation>
     </message>

@@ -37,7 +37,6 @@ from rhot_app.tracking.tracker import (
     HandFrame,
     Tracker,
     may_be_due,
-    with_calibration_error,
 )
 from rhot_node.wire.messages import MarkerFlag
 
@@ -59,6 +58,7 @@ def make_tracker(rig: Rig, *, smooth: bool = False, articulated: Sequence[Object
     used."""
     tracker = _tracker_of(rig, smooth, articulated)
     tracker.by_calibration = calibration_error(rig)
+    tracker.objects_of_markers = frozenset(one.name for one in rig.models if one.markers)
     return tracker
 
 
@@ -308,7 +308,7 @@ class SmoothedScene(Scene):
                          for hand, instant in zip(self._recorded, instants, strict=True)]
             if not part.failed:
                 self._published_ns = t_ns
-                yield with_calibration_error(self._at(t_ns, hands), self.calibration_error(self.by_calibration))
+                yield self.with_calibration_error(self._at(t_ns, hands))
 
     def finish(self) -> Iterator[HandState]:
         """The rest of the states."""

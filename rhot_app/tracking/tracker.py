@@ -111,6 +111,9 @@ class Tracker:
     by_calibration: CalibrationAccuracy = KNOWN_EXACTLY
     """What the calibration of the rig adds to the error of every place, as the rig says."""
 
+    objects_of_markers: frozenset[str] = frozenset()
+    """Names of the objects of colour markers, whose lengths do not show how far they are: they have that error, too."""
+
     key_frames: KeyFrames | None = None
     """The frames that tell most of a bare hand's shape; None for a tracker without contours. Any thread may read."""
 
@@ -136,7 +139,14 @@ class Tracker:
         """All states that are due, to be published: the error of the calibration is in their covariances."""
         state = self.solve()
         if state is not None:
-            yield with_calibration_error(state, self.calibration_error(self.by_calibration))
+            yield self.with_calibration_error(state)
+
+    def with_calibration_error(self, state: HandState) -> HandState:
+        """The state as it is published."""
+        own = with_calibration_error(state, self.calibration_error(self.by_calibration))
+        return replace(own, objects=tuple(
+            replace(one, covariance=_of_pose(one.world_from_object, one.covariance, self.by_calibration))
+            if one.name in self.objects_of_markers else one for one in own.objects))
 
     def calibration_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
         """What the calibration adds to the error of every place of the last state: what the rig has `stated`, and what
@@ -167,23 +177,22 @@ class Tracker:
 
 
 def with_calibration_error(state: HandState, error: CalibrationAccuracy) -> HandState:
-    """The state with `error` in the covariances of all places: of the hands and of the objects."""
+    """The state with `error` in the covariances of all places of its hands. Objects have the cameras' turns in their
+    own states."""
     if error.sd_m == error.turned_m == 0.0:
         return state
-
-    def of_pose(pose: Array, covariance: Array) -> Array:
-        out = covariance.copy()
-        out[:3, :3] += error.covariances(pose[:3, 3])
-        return out
-
     return replace(
         state, marker_covariances=state.marker_covariances + error.covariances(state.marker_positions),
         joint_covariances=state.joint_covariances + error.covariances(state.joint_positions),
         fingertip_covariances=state.fingertip_covariances + error.covariances(state.fingertip_positions),
-        palm_covariance=of_pose(state.world_from_palm, state.palm_covariance),
-        other=None if state.other is None else with_calibration_error(state.other, error),
-        objects=tuple(replace(one, covariance=of_pose(one.world_from_object, one.covariance))
-                      for one in state.objects))
+        palm_covariance=_of_pose(state.world_from_palm, state.palm_covariance, error),
+        other=None if state.other is None else with_calibration_error(state.other, error))
+
+
+def _of_pose(pose: Array, covariance: Array, error: CalibrationAccuracy) -> Array:
+    out = covariance.copy()
+    out[:3, :3] += error.covariances(pose[:3, 3])
+    return out
 
 
 def may_be_due(frame: CameraFrame) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rhot_app.__main__ import main
-from rhot_app.calibration.check.camera_calibration import calibration_error
+from rhot_app.calibration.check.camera_calibration import CalibrationAccuracy, calibration_error
 from rhot_app.calibration.check.camera_calibration import with_lens as with_lens_of
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.calibration.verdict import Grade
@@ -101,11 +101,42 @@ def test_lengths_that_nobody_checked_are_named(rig: Rig) -> None:
 def test_the_error_by_the_calibration_grows_with_the_square_of_the_distance(rig: Rig) -> None:
     error = calibration_error(rig)
     places = np.array([[0.0375, 0.0, 0.6], [0.0375, 0.0, 1.2], [np.nan, 0.0, 0.6]])
-    assert error.at(places)[:2] == pytest.approx([5e-4, 2e-3]) and np.isnan(error.at(places)[2])
+    aside = 0.0375**2  # the cameras' places vary
+    assert error.at(places)[:2] == pytest.approx([5e-4, 5e-4 * (1.2**2 + aside) / (0.6**2 + aside)])
+    assert np.isnan(error.at(places)[2])
     exact = change(rig, calibration=CameraCalibration("exact"))
     assert calibration_error(exact).at(places)[0] == 0.0  # type: ignore[arg-type]
     unknown = calibration_error(load_rig(resource_path("rigs", "two_pis.json")))
     assert not unknown.known and np.isnan(unknown.at(places)).all()
+
+
+RING = CalibrationAccuracy(2e-3, 0.6, 0.6 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0],
+                                                      [0.0, -1.0, 0.0]]))
+
+
+def test_in_a_ring_of_cameras_places_have_the_error_at_their_distance_from_them() -> None:
+    covariance = RING.covariances(np.zeros(3))
+    assert np.sqrt(np.trace(covariance)) > 1e-3 and covariance[0, 0] == pytest.approx(covariance[1, 1])
+
+
+def test_the_error_lies_along_the_lines_of_sight(rig: Rig) -> None:
+    """Two cameras side by side show a distance worst, and an error of several standard deviations has to be held."""
+    sds = np.sqrt(np.diagonal(calibration_error(rig).covariances(np.array([0.0375, 0.0, 0.6]))))
+    assert sds[2] == pytest.approx(5e-4, rel=0.01) and sds[2] > 1.5 * sds[0]
+
+
+@pytest.mark.parametrize(("turn", "expected_mm"), [(1e-3, 1.2), (1e-4, 0.12)])
+def test_a_camera_beside_another_does_not_make_places_uncertain(turn: float, expected_mm: float) -> None:
+    centres = np.array([[0.0, 0.0, 0.0], [0.002, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    turns = np.array([0.0, turn, turn])
+    both = CalibrationAccuracy(0.0, 0.6, centres).with_turns(turns, 0).turned_m
+    assert 1e3 * both == pytest.approx(expected_mm * np.sqrt(2.0), rel=0.01)
+    assert CalibrationAccuracy(0.0, 0.6, centres).with_turns(np.array([0.0, 0.0, turn]), 0).turned_m < both
+
+
+def test_cameras_far_apart_are_not_taken_to_be_turned_further() -> None:
+    assert RING.turn(np.array([1.2]))[0] == pytest.approx(2e-3 / 0.6)
+
 
 
 LENSES: list[tuple[str, Grade, dict[str, object]]] = [

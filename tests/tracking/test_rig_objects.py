@@ -25,7 +25,7 @@ from rhot_app.objects.object_file import ObjectMarker, ObjectModel, SphereShape,
 from rhot_app.objects.state import Validity
 from rhot_app.outputs.joints import JointConverter, json_message
 from rhot_app.outputs.osc import object_messages
-from rhot_app.project import Rig, with_object, with_tracker
+from rhot_app.project import CameraCalibration, Rig, with_object, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
@@ -65,6 +65,32 @@ def frames(rig: Rig, count: int) -> list[CameraObservations]:
                 camera, t_ns, 0, 1e-5, t_ns + 5_000_000, 1e-3, 1e-3, pixels, np.tile(0.01 * np.eye(2), (size, 1, 1)),
                 np.full(size, 16.0), np.ones(size), np.zeros(size, np.uint16)))
     return found
+
+
+def published(rig: Rig) -> tuple[HandState, HandState]:
+    """The last state as the tracker has it, and as it is published."""
+    tracker, state = make_tracker(rig), None
+    for frame in frames(rig, 30):
+        tracker.ingest(frame)
+        state = tracker.solve() or state
+    assert state is not None
+    return state, tracker.with_calibration_error(state)
+
+
+def depth_sd_m(state: HandState) -> float:
+    return float(np.sqrt(state.objects[0].covariance[2, 2]))
+
+
+def test_an_object_of_markers_has_the_calibrations_error_once(rig: Rig) -> None:
+    record = CameraCalibration("board", "ruler", 5e-3, 0.6)
+    own, shown = published(msgspec.structs.replace(rig, calibration=record))
+    assert depth_sd_m(shown) == pytest.approx(np.hypot(depth_sd_m(own), 5e-3 * (0.55 / 0.6) ** 2), rel=0.1)
+
+
+def test_turns_of_the_hands_estimate_are_not_added_to_an_object_that_has_its_own(rig: Rig) -> None:
+    own, shown = published(msgspec.structs.replace(with_tracker(rig, "estimator"), calibration=None))
+    assert depth_sd_m(shown) == depth_sd_m(own)
+    assert shown.fingertip_covariances[1, 2, 2] > own.fingertip_covariances[1, 2, 2]
 
 
 def last_state(rig: Rig, count: int = 30) -> HandState:

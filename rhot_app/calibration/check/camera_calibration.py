@@ -18,9 +18,6 @@ from rhot_app.project import Intrinsics, Rig, RigNode
 Array = NDArray[np.float64]
 
 NOT_CALIBRATED = "Not calibrated: millimetres are not reliable."
-LEAST_BASE_M = 1e-3
-"""m: cameras nearer to each other show no distance."""
-
 _NO_TURN = 1e-9
 """Vector part of a rotation's quaternion below which a pose is nominal. No solve finds cameras that parallel."""
 
@@ -128,14 +125,14 @@ def with_lens(rig: Rig, camera: str, lens: Intrinsics) -> Rig:
 class CalibrationAccuracy:
     """What a rig's calibration adds to the uncertainty of positions.
 
-    `sd_m` is the standard deviation at `distance_m` from `middle` (3,) m, the middle of the cameras, in the rig frame.
-    It is NaN when it is unknown, and `reason` then says why in a sentence. `turned_m`: standard deviation there, along
-    the line of sight, by turns that the cameras were found to have.
+    `sd_m` is the standard deviation at `distance_m` from the middle of the cameras, at `centres` (C, 3) m in
+    the rig frame. It is NaN when it is unknown; `reason` then says why in a sentence. `turned_m`: standard deviation
+    there, along the lines of sight, by turns that the cameras were found to have.
     """
 
     sd_m: float
     distance_m: float
-    middle: Array
+    centres: Array
     reason: str = ""
     turned_m: float = 0.0
 
@@ -147,35 +144,45 @@ class CalibrationAccuracy:
     def at(self, positions: Array) -> Array:
         """Standard deviations (...,) m at positions (..., 3) m of the rig frame.
 
-        They grow with the square of the distance, as the depth error of stereo does: dz = z^2 / (B f) dx.
+        They grow with the square of the distance to the cameras, as stereo's error of depth does: dz = z^2 / (B f) dx.
         """
-        away = np.linalg.norm(np.asarray(positions) - self.middle, axis=-1)
-        return np.asarray(self.sd_m * np.square(away / self.distance_m))
+        return self.sd_m * self._square_ratio(np.asarray(positions))
 
     def covariances(self, positions: Array) -> Array:
-        """Covariances (..., 3, 3) m^2 at positions (..., 3) m: the same along all axes, but at least that of the turns
-        along the line of sight. What is not known counts as nothing."""
-        away = np.asarray(positions) - self.middle
-        square, outer = np.square(away).sum(axis=-1)[..., None, None], away[..., :, None] * away[..., None, :]
-        each = 0.0 if self.reason else np.square(self.sd_m / self.distance_m**2) / 3.0
-        more = max(np.square(self.turned_m / self.distance_m**2) - each, 0.0)
-        return np.asarray(square * (each * square * np.eye(3) + more * outer))
+        """Covariances (..., 3, 3) m^2 at positions (..., 3) m: a third of the variance along each axis, and along the
+        lines of sight all of it, or that of the turns if it is more. What is not known counts as nothing."""
+        positions = np.asarray(positions)
+        away = positions[..., None, :] - self.centres
+        along = away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), np.finfo(float).tiny)
+        outer = np.einsum("...ci,...cj->...ij", along, along) / len(self.centres)
+        stated = 0.0 if self.reason else self.sd_m**2
+        more = max(stated, self.turned_m**2) - stated / 3.0
+        return np.asarray(np.square(self._square_ratio(positions))[..., None, None]
+                          * (stated / 3.0 * np.eye(3) + more * outer))
 
-    def with_turns(self, turns: Array, centres: Array, reference: int) -> CalibrationAccuracy:
-        """With what C cameras at `centres` (C, 3) m add that are turned by `turns` (C,) rad, rms about an axis, against
-        the `reference`, if it is more than before."""
-        base = np.linalg.norm(centres - centres[reference], axis=1)
-        apart = (base > LEAST_BASE_M) & (turns > 0.0)
-        turned_m = float(np.sqrt(np.mean(np.square(turns[apart] / base[apart])))) if apart.any() else 0.0
-        return replace(self, middle=centres.mean(axis=0), turned_m=max(self.distance_m**2 * turned_m, self.turned_m))
+    def with_turns(self, turns: Array, reference: int) -> CalibrationAccuracy:
+        """With what C cameras add that are turned by `turns` (C,) rad, rms about an axis, against `reference`, if it
+        is more than before. 0: not tracked with. Cameras far apart show a distance better, and count more."""
+        others = np.flatnonzero((np.arange(len(turns)) != reference) & (turns > 0.0))
+        base = np.linalg.norm(self.centres[others] - self.centres[reference], axis=1)
+        if not base.any():
+            return self
+        turned_m = self.distance_m**2 / float(np.sqrt(np.mean(np.square(base / turns[others]))))
+        return replace(self, turned_m=max(turned_m, self.turned_m))
 
     def turn(self, base_m: Array) -> Array:
         """Standard deviations (...,) rad of a turn between cameras `base_m` (...,) m apart that by itself makes this
-        error: dz = z^2 / B dphi."""
-        return np.asarray(self.sd_m * base_m / self.distance_m**2)
+        error: dz = z^2 / B dphi, of cameras further apart than the distance dz = z dphi."""
+        return np.asarray(self.sd_m * np.minimum(base_m, self.distance_m) / self.distance_m**2)
+
+    def _square_ratio(self, positions: Array) -> Array:
+        """(...,) the mean square of the distances to the cameras, of that where `sd_m` is."""
+        middle = self.centres.mean(axis=0)
+        spread = np.square(self.centres - middle).sum(axis=1).mean()
+        return np.asarray((np.square(positions - middle).sum(axis=-1) + spread) / (self.distance_m**2 + spread))
 
 
-KNOWN_EXACTLY = CalibrationAccuracy(0.0, 1.0, np.zeros(3))
+KNOWN_EXACTLY = CalibrationAccuracy(0.0, 1.0, np.zeros((1, 3)))
 
 
 def calibration_error(rig: Rig | None) -> CalibrationAccuracy:
@@ -184,18 +191,21 @@ def calibration_error(rig: Rig | None) -> CalibrationAccuracy:
         return KNOWN_EXACTLY
     found, record = calibration_finding(rig), rig.calibration
     if found is not None and found.finding.figure == NOT_CALIBRATED:
-        return _unknown("Nobody knows how far places are off: the cameras are not calibrated.")
+        return _unknown(rig, "Nobody knows how far places are off: the cameras are not calibrated.")
     if record is not None and record.method == "exact":
-        return KNOWN_EXACTLY
+        return CalibrationAccuracy(0.0, 1.0, _centres(rig))
     if record is None or record.error_m is None:
-        return _unknown("Nobody knows how far places are off: the rig file does not say how well its cameras were "
+        return _unknown(rig, "Nobody knows how far places are off: the rig file does not say how well its cameras were "
                         "calibrated. Repeat the stereo calibration (Calibrate menu) to know it.")
-    middle = np.mean([node.pose.translation_m for node in rig.nodes], axis=0)
-    return CalibrationAccuracy(record.error_m, record.distance_m, middle)
+    return CalibrationAccuracy(record.error_m, record.distance_m, _centres(rig))
 
 
-def _unknown(reason: str) -> CalibrationAccuracy:
-    return CalibrationAccuracy(float("nan"), 1.0, np.zeros(3), reason)
+def _unknown(rig: Rig, reason: str) -> CalibrationAccuracy:
+    return CalibrationAccuracy(float("nan"), 1.0, _centres(rig), reason)
+
+
+def _centres(rig: Rig) -> Array:
+    return np.array([node.pose.translation_m for node in rig.nodes])
 
 
 def _poses_nominal(rig: Rig) -> bool:

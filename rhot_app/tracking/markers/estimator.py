@@ -90,7 +90,6 @@ class Estimator(Tracker):
         self.diagnostics = Diagnostics()
         self._rig, self._markers = compile_rig(rig), compile_markers(rig)
         self._tracked_with = rig.tracked_with
-        self._centres = np.array([node.pose.translation_m for node in rig.nodes])
         self._file_size, prior = self._markers, self._markers.pose_prior
         self._size: HandSize | None = None
         if rig.tracker.float_scale:
@@ -119,6 +118,7 @@ class Estimator(Tracker):
         self._life, self._by_one = Life(), False
         self._filter.end()
         self._rejections = Rejections(self._rig, self._markers)
+        self._states.turns = self._markers.turn_sd
 
     def ingest(self, frame: CameraFrame) -> None:
         """Take one frame in; it is weighed by the next `solve`."""
@@ -156,7 +156,7 @@ class Estimator(Tracker):
         """See `Tracker`. Cameras that are found to be turned otherwise than the rig says are so about the axis, too,
         about which this cannot be found."""
         turns = np.where(self._tracked_with, self._states.turns, 0.0)
-        return stated.with_turns(turns, self._centres, self._markers.reference)
+        return stated.with_turns(turns, self._markers.reference)
 
     def _take(self, observations: CameraObservations) -> bool:
         """Weigh one frame; False when it came before."""

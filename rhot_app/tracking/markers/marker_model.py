@@ -156,11 +156,11 @@ def compile_markers(rig: Rig) -> MarkerModel:
 def turn_sds(rig: Rig, reference: int) -> Array:
     """(C,) rad: standard deviations of the cameras' turns against that of `reference`, beside what the rig says. Those
     of a calibrated rig are of the calibration and of what may have happened since, to a simulated one nothing."""
-    error = calibration_error(rig)
-    if not error.known:
+    error, exact = calibration_error(rig), rig.calibration is not None and rig.calibration.method == "exact"
+    if not error.known or rig.depth.mode == "disparity":
         return np.full(len(rig.nodes), TURN_SD_RAD)
     centres = np.array([node.pose.translation_m for node in rig.nodes])
-    drift = 0.0 if error.sd_m == 0.0 else DRIFT_SD_RAD
+    drift = 0.0 if exact else DRIFT_SD_RAD
     return np.maximum(np.hypot(error.turn(np.linalg.norm(centres - centres[reference], axis=1)), drift), HELD_SD_RAD)
 
 

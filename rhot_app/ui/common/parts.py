@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,11 +44,11 @@ def scrolled(widget: QWidget) -> QScrollArea:
 
 
 def ask_where_to_save(parent: QWidget, title: str, start: Path, kinds: str) -> Path | None:
-    """A file to be written, None when the person cancels. A name without an ending gets that of `start`; what stands
-    there already is asked about by the desktop's dialog, or here where the ending was missing."""
+    """A file to be written, None when the person cancels. A name with none of the endings of `kinds` gets that of
+    `start`; what stands there already is asked about by the desktop's dialog, or here where the ending was missing."""
     name, _ = QFileDialog.getSaveFileName(parent, title, str(start), kinds)
     path = Path(name)
-    if not name or path.suffix:
+    if not name or f"*{path.suffix.lower()}" in re.findall(r"\*\.\w+", kinds.lower()):
         return path if name else None
     path = path.with_name(path.name + start.suffix)
     buttons = QMessageBox.StandardButton

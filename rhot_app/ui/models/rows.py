@@ -172,10 +172,8 @@ def marker_detail(state: HandState, marker: int, by_calibration: CalibrationAccu
     lines = [f"x, y, z: {position_text(state.marker_positions[marker])}"]
     variances = np.diagonal(state.marker_covariances[marker])
     if np.isfinite(variances).all() and (variances >= 0).all():
-        more = float(by_calibration.at(state.marker_positions[marker])) if by_calibration.known else 0.0
         spread = ", ".join(f"{math.sqrt(v) * 1e3:.2f}" for v in variances)
-        lines.append(tr("± {spread} mm (one sigma)", spread=spread) + (
-            tr(", {more:.2f} mm of it by the calibration", more=1e3 * more) if more > 0.0 else ""))
+        lines.append(tr("± {spread} mm (one sigma)", spread=spread))
     if not by_calibration.known:
         reason = by_calibration.reason
         lines.append(tr("At least: {reason}", reason=reason[:1].lower() + reason[1:]))

@@ -81,17 +81,19 @@ def test_a_scene_is_saved_while_it_runs_and_opened_again(director, tmp_path):
             director.until(lambda answer=answer: any(
                 answer in text and "nothing was saved" in text for text in director.window.advice.texts))
         director.window.passing.clear()
+    assert not list(tmp_path.glob("*.json"))
     assert director.choose(actions.save_scene, path.with_suffix("")) == []
     director.until(path.exists)
     assert read_scene(path).shown() == HandShow("wave")
     before = path.read_bytes()
+    director.window.controller.backend.show_in_twin("hand:still")
     for replace in (False, True):
         asked = director.choose(actions.save_scene, path.with_suffix(""), replace=replace)
         assert len(asked) == 1 and "lamp.json" in asked[0]
         director.run(0.5)
-    director.window.controller.backend.show_in_twin("hand:still")
+        assert (path.read_bytes() != before) is replace
+    director.window.controller.backend.show_in_twin("hand:wave")
     director.choose(actions.open_scene, path)
     director.until(lambda: director.window.toolbar.badge.word != "TRACKING")
     director.track()
-    assert director.window.controller.backend.shown_in_twin() == "hand:wave"
-    assert path.read_bytes() == before
+    assert director.window.controller.backend.shown_in_twin() == "hand:still"
