@@ -66,7 +66,8 @@ class LayeredFrame:
     that of `image` (H, W). `noise`: of a pixel, of 255. `outline`: None for regions only. `background` (H, W): the same
     filter of the scene without the object, None: nothing is known of it. `spread` (P, P): covariance of root and angles
     before the image was looked at, whose errors are no outliers. `used` (L,): template points that were compared, and
-    `held` (L,) of them within three standard deviations, when last linearised; `reasons`: by layer, why there were
+    `held` (L,) of them within three standard deviations, when last linearised, none of a template whose contrast the
+    image does not have: a plain surface agrees with any template but for that; `reasons`: by layer, why there were
     none.
     """
 
@@ -140,10 +141,12 @@ class LayeredFrame:
             SHAPE_SD_M * scales_of(slopes[seen])) ** 2
         wide = variance + np.sum((rows @ self.spread) * rows, axis=1)
         by_light, prior = light / wide[:, None], np.diag(np.tile(LIGHT_SD**-2.0, len(good)))
-        offset = light @ np.linalg.solve(prior + by_light.T @ light, by_light.T @ error)
+        lamp = np.linalg.solve(prior + by_light.T @ light, by_light.T @ error)
+        offset = light @ lamp
         square = (error - offset) ** 2 / wide
         self.used += np.bincount(layer, minlength=len(frames))
-        self.held += np.bincount(layer[square < _OUTLIER**2], minlength=len(frames))
+        lit = np.abs(lamp[1::2]) < _OUTLIER * LIGHT_SD[1]
+        self.held += np.bincount(layer[(square < _OUTLIER**2) & lit[number[seen]]], minlength=len(frames))
         normal.add(rows, error, square, variance, light, prior)
         # The sign is opposite to the formula's: a link that seems to have another brightness is misplaced more often.
         # Without the term a finger is lost in one of five films of `benchmarks/templates.py`; with the formula's sign

@@ -56,7 +56,8 @@ _STARTS = 4  # refined of all, the best by the cost of all points
 class Mode:
     """A state that explains the observations: a local minimum of the cost.
 
-    `state` and `covariance` (n, n) in its tangent space as in `motion`: n is 6, the pose alone, or all of it. `cost`:
+    `state` and `covariance` (n, n) in its tangent space, of a rigid object as in `motion`: n is 6, the pose alone, or
+    all of it. `cost`:
     -2 log posterior of `points` image points, up to a constant. `rms_px`: reprojection error. `probability` among all
     modes.
     """

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics, Part
+from rhot_app.errors import ObjectError
 from rhot_app.estimation.filter import Estimate, FilteredState, Knot
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.quantiles import chi_squared
@@ -75,7 +76,7 @@ class Gated:
 
 
 class Measurement(Protocol):
-    """What a track takes: image points of one frame, or another tracker's pose."""
+    """What a track takes: image points of one frame, its picture, or another tracker's pose."""
 
     @property
     def t_ns(self) -> int:
@@ -159,7 +160,10 @@ class _Hypothesis:
 
 
 class ObjectTrack:
-    """The track of one object: it appears, is lost, and returns."""
+    """The track of one object: it appears, is lost, and returns, unless its measurements show no start."""
+
+    poses: ClassVar[bool] = True
+    """Whether it takes the poses of other trackers."""
 
     def __init__(self, name: str, process: Process | None = None, velocity: slice = VELOCITY) -> None:
         """`process`: of a state that begins with the object's pose, and has its `velocity`; a rigid object's by
@@ -171,11 +175,12 @@ class ObjectTrack:
         """Forget everything: a new session, or a node's clock was set."""
         self._hypotheses: list[_Hypothesis] = []
         self._life, self._rejected = Life(), 0
+        self._period_ns = 0
 
     def take(self, measurement: Measurement) -> bool:
         """Weigh a measurement; whether it was accepted. One from before the oldest knot is not."""
         t_ns = measurement.t_ns
-        if self._life.lost(t_ns):
+        if self._life.lost(t_ns, self._period_ns):
             self._hypotheses.clear()
         if not self._hypotheses:
             return self._start(measurement)
@@ -198,14 +203,14 @@ class ObjectTrack:
     def predicts(self, measurement: Measurement) -> bool:
         """Whether a hypothesis accepts a measurement; False without a track."""
         t_ns = measurement.t_ns
-        return not self._life.lost(t_ns) and any(
+        return not self._life.lost(t_ns, self._period_ns) and any(
             not one.filter.forgot(t_ns) and measurement.gate(*one.filter.predict_ns(t_ns)).residual is not None
             for one in self._hypotheses)
 
     def state(self, t_ns: int) -> ObjectState:
         """The state at master time `t_ns` by the measurements before it. The newest ones are kept for that: at an
         earlier time than all of them it is that of the oldest."""
-        if not self._hypotheses or self._life.lost(t_ns):
+        if not self._hypotheses or self._life.lost(t_ns, self._period_ns):
             return unknown_object(self.name, t_ns, Validity.LOST if self._life.ever else Validity.SEARCHING)
         best = self._hypotheses[0]
         t_s = max(best.filter.seconds(t_ns), best.filter.knots[0].t_s)
@@ -355,8 +360,12 @@ class ObjectTracker:
                  diagnostics: Diagnostics | None = None, camera_names: Sequence[str] = (),
                  further: Sequence[ObjectTrack] = (), reference: int = 0, turn_sd: Array | None = None) -> None:
         """`diagnostics` takes what it fails over and warns of, by `camera_names`. `further`: tracks of other objects.
-        `reference`, `turn_sd`: as `CameraArrays`. Raises ObjectError when two objects cannot be told apart."""
+        `reference`, `turn_sd`: as `CameraArrays`. Raises ObjectError when two objects cannot be told apart, or have one
+        name."""
         require_distinct(objects, [one.name for one in objects])
+        called = [one.name for one in (*objects, *further)]
+        if twice := [name for name in called if called.count(name) > 1]:
+            raise ObjectError(f"two objects are called {twice[0]!r}. Rename one.")
         self._diagnostics = Diagnostics() if diagnostics is None else diagnostics
         names = camera_names or [str(number) for number in range(len(cameras))]
         arrays = CameraArrays.of(list(cameras), reference, turn_sd)
@@ -372,7 +381,7 @@ class ObjectTracker:
         """Weigh a pose of the object `name`; whether it was accepted. One of an object that is not here is not."""
         accepted = False
         for track in self.tracks:
-            if track.name == name:
+            if track.poses and track.name == name:
                 with self._part(track):
                     accepted |= track.take(measurement)
         return accepted

@@ -1,6 +1,6 @@
 """The tracked objects of a rig, and their contacts with its hands.
 
-They take fiducial tags, colour markers and poses of other trackers.
+They take fiducial tags, colour markers, poses of other trackers, and pictures.
 
 A state's objects are those at the hand's instant, by everything that has come until then.
 """
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhot_app.diagnostics import Diagnostics
+from rhot_app.errors import TrackingError
 from rhot_app.estimation.filter import AHEAD_S, FilteredState, smooth
 from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.track import LOST_NS, PREDICTED_NS
@@ -64,10 +65,15 @@ class RigObjects:
             contacts.reset()
 
     def ingest(self, frame: ObjectFrame) -> None:
-        """Take the tags of one frame, a pose of another tracker, or a picture in."""
+        """Take the tags of one frame, a pose of another tracker, or a picture in. Raises TrackingError for a frame of a
+        camera that the rig does not have."""
         if isinstance(frame, MeasuredPose):
             self._tracker.take_pose(frame.name, PoseMeasurement(frame.t_ns, frame.world_from_object, frame.covariance))
-        elif self._tracked_with[frame.camera]:
+            return
+        if not 0 <= frame.camera < len(self._tracked_with):
+            raise TrackingError(f"a frame is of camera {frame.camera}, but the rig has {len(self._tracked_with)}; "
+                                "number them from 0")
+        if self._tracked_with[frame.camera]:
             self._tracker.take(frame)
 
     def ingest_markers(self, frame: CameraObservations) -> None:
@@ -176,13 +182,15 @@ class _History:
         self._first_ns: int | None = None
 
     def add(self) -> None:
-        """Keep the track's estimate, if it is newer than the last one."""
+        """Keep the track's estimate, in place of the last one if that is of the same time."""
         found = self._track.estimate()
         if found is None:
             return
         t_ns, estimate = found
         self._first_ns = t_ns if self._first_ns is None else self._first_ns
         t_s = 1e-9 * (t_ns - self._first_ns)
+        if self._filtered and t_s == self._filtered[-1].t_s:  # of a further camera, which has added to it
+            self._filtered.pop()
         if not self._filtered or t_s > self._filtered[-1].t_s:
             self._filtered.append(replace(estimate, t_s=t_s))
 

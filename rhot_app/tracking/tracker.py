@@ -92,8 +92,8 @@ class HandFrame:
 
 
 CameraFrame = CameraObservations | ObjectFrame | ImageFrame | HandFrame
-"""What a source delivers: markers, fiducial tags, edges or foreground of one camera's frame, a pose of another tracker,
-or what another kind observes."""
+"""What a source delivers: markers, fiducial tags, edges or foreground of one camera's frame, its picture, a pose of
+another tracker, or what another kind observes."""
 
 
 class Tracker:

@@ -32,7 +32,7 @@ from rhot_app.estimation.layout import pose_matrix
 from rhot_app.estimation.quantiles import chi_squared
 from rhot_app.estimation.residual import Process, Residual
 from rhot_app.estimation.se3 import PoseState, retract
-from rhot_app.estimation.track import GATE
+from rhot_app.estimation.track import GATE, NEVER
 from rhot_app.geometry.camera import CameraModel, CameraRecord
 from rhot_app.hand.articulated_model import STATE_ROOT, ArticulatedModel, forward_state
 from rhot_app.objects.observations import FrameOfObjects, PictureFrame
@@ -108,6 +108,11 @@ class Picture(NamedTuple):
     image: Image
 
 
+def _is_picture(image: Any, size: tuple[int, int]) -> bool:
+    """Whether it is (H, W, 3) bytes of this height and width."""
+    return isinstance(image, np.ndarray) and image.dtype == np.uint8 and image.shape == (*size, 3)
+
+
 class TemplateKind(Kind):
     """See `Kind`. Their residual is `articulated.layered.LayeredFrame`, on the state of a `LayeredTrack`."""
 
@@ -121,8 +126,8 @@ class TemplateKind(Kind):
         self._size = lens.height, lens.width
 
     def refusal(self, message: Any) -> str | None:
-        """A picture of another size."""
-        return None if message.image.shape[:2] == self._size else "image_size"
+        """A picture of another size, or not of RGB bytes."""
+        return None if _is_picture(message.image, self._size) else "image_size"
 
     def observe(self, collected: Any, times: FrameTimes) -> PictureFrame:
         """See `Kind`."""
@@ -132,17 +137,20 @@ class TemplateKind(Kind):
 @dataclass(eq=False, slots=True)
 class View:
     """One camera of a track. `background`: the filtered scene without the object, by smoothing; None: unknown.
-    `frame`: the last picture."""
+    `frame`: the last picture, of master time `newest_ns`."""
 
     camera: CameraRecord
     rays: Array
     background: list[Filtered] | None = None
     noise: float = 0.0
     frame: LayeredFrame | None = None
+    newest_ns: int = NEVER
 
 
 class LayeredTrack(ObjectTrack):
     """The track of one articulated object by its templates. It begins where somebody says; templates show no start."""
+
+    poses = False
 
     def __init__(self, name: str, bodies: Bodies, limits: Array, process: Process, cameras: Sequence[CameraModel], *,
                  kind: ImageFilter = "raw", layered: bool = True, outline: bool = True,
@@ -150,40 +158,68 @@ class LayeredTrack(ObjectTrack):
         """`limits` (A, 2) rad. `process`: a state begins with world_from_root (3, 4), the angles and the root's
         velocity, its tangent space with the root's translation, rotation and the angles. `kind`: how images are
         filtered; outlines need ``raw``. `layered` False: every template is taken for visible. `backgrounds`: each
-        camera's image (H, W, 3) RGB without the object."""
+        camera's image (H, W, 3) RGB without the object. Raises TrackingError when one is missing, or of another size
+        than the camera's."""
         self.bodies, self.layered, self.outline = bodies, layered, outline and kind == "raw"
         self.templates = TemplateSet(kind)
         self.views = [View(camera.record, camera_rays(camera)) for camera in cameras]
-        for view, background in zip(self.views, backgrounds or (), strict=False):
+        if backgrounds is not None and len(backgrounds) != len(cameras):
+            raise TrackingError(f"there are {len(backgrounds)} backgrounds of {len(cameras)} cameras; give one of each")
+        for number, (view, background) in enumerate(zip(self.views, backgrounds or (), strict=False)):
+            if not _is_picture(background, view.rays.shape[:2]):
+                raise TrackingError(f"background {number} has another size than its camera's pictures, or is not "
+                                    "(H, W, 3) RGB bytes; give one that the camera took")
             view.background = self.templates.images(background)
         self._limits, self._pose = JointLimits(limits), ROOT_POSE + len(limits)
         moving = ANGLES + len(limits)
         super().__init__(name, process, slice(moving, moving + ROOT_POSE))
 
     def start(self, state: Array, covariance: Array, t_ns: int) -> None:
-        """Begin in a state that is known with this covariance at master time `t_ns`, with the first picture of that
-        instant; from all of its pictures the first templates are taken."""
+        """Begin anew in a state that is known with this covariance at master time `t_ns`, with the first picture from
+        then on; from all pictures of its instant the first templates are taken."""
         self.reset()
-        self._known.append((t_ns, Mode(state, covariance, 0.0, 0, 0.0)))
+        self.templates.templates.clear()
+        self.templates.refused.clear()
+        self._known = t_ns, Mode(state, covariance, 0.0, 0, 0.0)
 
     def reset(self) -> None:
         """Forget everything but the templates."""
         super().reset()
-        self._known: list[tuple[int, Mode]] = []
+        self._known: tuple[int, Mode] | None = None
+        for view in self.views:
+            view.noise, view.frame, view.newest_ns = 0.0, None, NEVER
 
     def ingest(self, frame: FrameOfObjects) -> None:
         """See `ObjectTrack`."""
         if not isinstance(frame, PictureFrame):
             return
-        t_ns = frame.t_row0_master_ns
-        known = [mode for start_ns, mode in self._known if start_ns == t_ns]
+        t_ns, view = frame.t_row0_master_ns, self.views[frame.camera]
+        if t_ns > view.newest_ns > NEVER:
+            gap_ns = t_ns - view.newest_ns
+            self._period_ns = min(self._period_ns, gap_ns) if self._period_ns else gap_ns
+        view.newest_ns, view.frame = max(view.newest_ns, t_ns), None
+        known = self._known_at(t_ns)
         begun = known and self.estimate() is not None
-        if (begun or self.take(_Comparison(t_ns, known, partial(self.gate, frame)))) and (found := self.estimate()):
-            self.learn(frame, found[1].state, found[1].covariance, bool(known))
-        elif self._hypotheses and self._rejected >= REJECTIONS and self._life.wrong(t_ns):
-            compared = self.views[frame.camera].frame
-            if compared is not None and compared.used.sum() >= LEAST_POINTS:  # it is elsewhere, and shows no start
-                self._hypotheses.clear()
+        if begun or self.take(_Comparison(t_ns, known, partial(self.gate, frame))):
+            found = self.estimate()
+            if known:
+                self.learn(frame, known[0].state, known[0].covariance, True)
+            elif found is not None and found[0] == t_ns:  # a late picture shows the object where it was before
+                self.learn(frame, found[1].state, found[1].covariance, False)
+        elif view.frame is None or view.frame.used.sum() < LEAST_POINTS:  # it says nothing
+            self._rejected = max(self._rejected - 1, 0)
+        elif self._rejected >= REJECTIONS and self._life.wrong(t_ns, self._period_ns):
+            self._hypotheses.clear()  # it is elsewhere, and shows no start
+
+    def _known_at(self, t_ns: int) -> list[Mode]:
+        """The state at an instant if somebody knows it: that of the start, which the first picture from then on has."""
+        if self._known is None or t_ns < self._known[0]:
+            return []
+        start_ns, mode = self._known
+        if not self._life.ever and t_ns > start_ns:
+            state, covariance = self._process.predict(mode.state, mode.covariance, 1e-9 * (t_ns - start_ns))
+            self._known = t_ns, replace(mode, state=state, covariance=covariance)
+        return [self._known[1]] if self._known[0] == t_ns else []
 
     def _expected(self, frame: PictureFrame, covariance: Array, level: int, state: Array) -> LayeredFrame:
         """What the templates should be compared with in one picture, for an object near `state`, known with
@@ -203,6 +239,12 @@ class LayeredTrack(ObjectTrack):
     def gate(self, frame: PictureFrame, state: Array, covariance: Array) -> Gated:
         """The picture with the last smoothing, about the state by those before, unless that contradicts the prediction
         or what is compared."""
+        try:
+            return self._compared(frame, state, covariance)
+        except np.linalg.LinAlgError:  # the estimate contradicts itself
+            return Gated(None, 0.0)
+
+    def _compared(self, frame: PictureFrame, state: Array, covariance: Array) -> Gated:
         def observe(level: int, about: Array, _: Estimate) -> list[Residual]:
             return [self._expected(frame, covariance, level, about), self._limits]
 
@@ -267,15 +309,18 @@ class LayeredTrack(ObjectTrack):
 
 def picture_frames(rig: Rig, images: Sequence[Image | None], t_ns: Sequence[int]) -> list[PictureFrame]:
     """A picture of each camera, None where it has none, of master times `t_ns` (C,), as a scene takes them. Raises
-    TrackingError when one has another size than the rig says."""
+    TrackingError when their number is not that of the cameras, or one is not as the rig says."""
     found = []
+    if not len(images) == len(t_ns) == len(rig.nodes):
+        raise TrackingError(f"there are {len(images)} pictures and {len(t_ns)} times of {len(rig.nodes)} cameras; give "
+                            "one of each, None where there is none")
     for camera, (image, t) in enumerate(zip(images, t_ns, strict=True)):
         if image is not None:
             kind = TemplateKind()
             kind.configure(rig, camera)
             if kind.refusal(Picture(image)) is not None:
-                raise TrackingError(f"the picture of {rig.nodes[camera].name} has another size than the rig says; give "
-                                    "the one that the camera took")
+                raise TrackingError(f"the picture of {rig.nodes[camera].name} has another size than the rig says, or "
+                                    "is not (H, W, 3) RGB bytes; give the one that the camera took")
             found.append(kind.observe(Picture(image), FrameTimes(t, t, t, 0.0)))
     return found
 
