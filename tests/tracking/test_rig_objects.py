@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from shipped_rig import TWO_PIS
 
+from rhot_app.calibration.check.camera_calibration import CalibrationAccuracy
 from rhot_app.calibration.check.checks import check_rig
 from rhot_app.engine.pipeline import warm_up
 from rhot_app.errors import RigError
@@ -25,7 +26,7 @@ from rhot_app.objects.object_file import ObjectMarker, ObjectModel, SphereShape,
 from rhot_app.objects.state import Validity
 from rhot_app.outputs.joints import JointConverter, json_message
 from rhot_app.outputs.osc import object_messages
-from rhot_app.project import CameraCalibration, Rig, with_object, with_tracker
+from rhot_app.project import Rig, with_object, with_tracker
 from rhot_app.state import Condition, HandState, Knowledge
 from rhot_app.tracking.extrapolation import Extrapolator
 from rhot_app.tracking.markers.estimator import Estimator
@@ -67,9 +68,10 @@ def frames(rig: Rig, count: int) -> list[CameraObservations]:
     return found
 
 
-def published(rig: Rig) -> tuple[HandState, HandState]:
+def published(rig: Rig, error: CalibrationAccuracy | None = None) -> tuple[HandState, HandState]:
     """The last state as the tracker has it, and as it is published."""
     tracker, state = make_tracker(rig), None
+    tracker.by_calibration = error or tracker.by_calibration
     for frame in frames(rig, 30):
         tracker.ingest(frame)
         state = tracker.solve() or state
@@ -82,8 +84,7 @@ def depth_sd_m(state: HandState) -> float:
 
 
 def test_an_object_of_markers_has_the_calibrations_error_once(rig: Rig) -> None:
-    record = CameraCalibration("board", "ruler", 5e-3, 0.6)
-    own, shown = published(msgspec.structs.replace(rig, calibration=record))
+    own, shown = published(rig, CalibrationAccuracy(5e-3, 0.6, np.array([one.pose.translation_m for one in rig.nodes])))
     assert depth_sd_m(shown) == pytest.approx(np.hypot(depth_sd_m(own), 5e-3 * (0.55 / 0.6) ** 2), rel=0.1)
 
 
