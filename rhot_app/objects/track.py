@@ -363,7 +363,7 @@ class ObjectTracker:
         `reference`, `turn_sd`: as `CameraArrays`. Raises ObjectError when two objects cannot be told apart, or have one
         name."""
         require_distinct(objects, [one.name for one in objects])
-        called = [one.name for one in (*objects, *further)]
+        called = [one.name for one in objects] + [one.name for one in further]
         if twice := [name for name in called if called.count(name) > 1]:
             raise ObjectError(f"two objects are called {twice[0]!r}. Rename one.")
         self._diagnostics = Diagnostics() if diagnostics is None else diagnostics

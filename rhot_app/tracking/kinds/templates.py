@@ -180,12 +180,12 @@ class LayeredTrack(ObjectTrack):
         self.reset()
         self.templates.templates.clear()
         self.templates.refused.clear()
-        self._known = t_ns, Mode(state, covariance, 0.0, 0, 0.0)
+        self._known: tuple[int, Mode] | None = t_ns, Mode(state, covariance, 0.0, 0, 0.0)
 
     def reset(self) -> None:
         """Forget everything but the templates."""
         super().reset()
-        self._known: tuple[int, Mode] | None = None
+        self._known = None
         for view in self.views:
             view.noise, view.frame, view.newest_ns = 0.0, None, NEVER
 
