@@ -17,12 +17,12 @@ from rhot_app.geometry.camera import camera_coordinates
 Array = NDArray[np.float64]
 
 HELD_SD_RAD = 2e-5
-"""rad, 0.01 px of a lens of 530 px: the least that is believed of any turn, and all that is of one about the normal of
+"""rad, 0.01 px of a lens of 530 px: the least standard deviation of any turn, and that of one about the normal of
 the plane of both cameras and what they see. That moves things along the lines of sight and contradicts nothing: their
 own lengths alone would decide it, and they are not known better."""
 
 TURN_S = 3600.0
-"""s: how long a turn lasts."""
+"""s: correlation time of a turn. Chosen: a bracket follows the temperature of a room within an hour."""
 
 
 @njit(cache=True)

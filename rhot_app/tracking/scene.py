@@ -186,10 +186,10 @@ class Scene(Tracker):
         for hand in self._hands:
             hand.wait()
 
-    def calibration_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
+    def published_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
         """See `Tracker`."""
         for hand in self._hands:
-            stated = hand.calibration_error(stated)
+            stated = hand.published_error(stated)
         return stated
 
     # -- states --------------------------------------------------------------------------------------------------------
@@ -308,7 +308,7 @@ class SmoothedScene(Scene):
                          for hand, instant in zip(self._recorded, instants, strict=True)]
             if not part.failed:
                 self._published_ns = t_ns
-                yield self.with_calibration_error(self._at(t_ns, hands))
+                yield self.published(self._at(t_ns, hands))
 
     def finish(self) -> Iterator[HandState]:
         """The rest of the states."""

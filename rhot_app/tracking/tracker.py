@@ -139,16 +139,17 @@ class Tracker:
         """All states that are due, to be published: the error of the calibration is in their covariances."""
         state = self.solve()
         if state is not None:
-            yield self.with_calibration_error(state)
+            yield self.published(state)
 
-    def with_calibration_error(self, state: HandState) -> HandState:
-        """The state as it is published."""
-        own = with_calibration_error(state, self.calibration_error(self.by_calibration))
-        return replace(own, objects=tuple(
-            replace(one, covariance=_of_pose(one.world_from_object, one.covariance, self.by_calibration))
-            if one.name in self.objects_of_markers else one for one in own.objects))
+    def published(self, state: HandState) -> HandState:
+        """The state with the error of the calibration in the covariances of its places. Of objects only those of colour
+        markers have it here: the others have the cameras' turns in their own estimate."""
+        own, other = with_calibration_error(state, self.published_error(self.by_calibration)), state.other
+        objects = tuple(replace(one, covariance=_of_pose(one.world_from_object, one.covariance, self.by_calibration))
+                        if one.name in self.objects_of_markers else one for one in state.objects)
+        return replace(own, objects=objects, other=None if other is None else self.published(other))
 
-    def calibration_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
+    def published_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
         """What the calibration adds to the error of every place of the last state: what the rig has `stated`, and what
         the tracker has found."""
         return stated
@@ -177,16 +178,14 @@ class Tracker:
 
 
 def with_calibration_error(state: HandState, error: CalibrationAccuracy) -> HandState:
-    """The state with `error` in the covariances of all places of its hands. Objects have the cameras' turns in their
-    own states."""
+    """The state with `error` in the covariances of all places of its hand."""
     if error.sd_m == error.turned_m == 0.0:
         return state
     return replace(
         state, marker_covariances=state.marker_covariances + error.covariances(state.marker_positions),
         joint_covariances=state.joint_covariances + error.covariances(state.joint_positions),
         fingertip_covariances=state.fingertip_covariances + error.covariances(state.fingertip_positions),
-        palm_covariance=_of_pose(state.world_from_palm, state.palm_covariance, error),
-        other=None if state.other is None else with_calibration_error(state.other, error))
+        palm_covariance=_of_pose(state.world_from_palm, state.palm_covariance, error))
 
 
 def _of_pose(pose: Array, covariance: Array, error: CalibrationAccuracy) -> Array:

@@ -76,7 +76,7 @@ def published(rig: Rig, error: CalibrationAccuracy | None = None) -> tuple[HandS
         tracker.ingest(frame)
         state = tracker.solve() or state
     assert state is not None
-    return state, tracker.with_calibration_error(state)
+    return state, tracker.published(state)
 
 
 def depth_sd_m(state: HandState) -> float:

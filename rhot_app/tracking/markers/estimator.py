@@ -152,7 +152,7 @@ class Estimator(Tracker):
         return self._states.describe(self._filter.newest_ns, knot.state, knot.covariance, self._sequence - 1,
                                       taken[-1], begun, by_one=self._by_one)
 
-    def calibration_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
+    def published_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:
         """See `Tracker`. Cameras that are found to be turned otherwise than the rig says are so about the axis, too,
         about which this cannot be found."""
         turns = np.where(self._tracked_with, self._states.turns, 0.0)
