@@ -14,6 +14,10 @@ from pathlib import Path
 import pytest
 
 WEIGHTS = Path(__file__).with_name("file_seconds.json")
+TOGETHER = "tests/ui/wizards/on_simulated_rig/"
+"""Files that run one after the other: two simulated rigs at once are too slow for a person's movements on two
+processors."""
+
 CACHE_KEY = "rhot/test_times"
 UNKNOWN_S = 10.0
 """Seconds that are expected of a file that no run has measured."""
@@ -21,11 +25,15 @@ UNKNOWN_S = 10.0
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Distributes whole files to the processes in the order of their collection."""
+    """Distributes whole files to the processes in the order of their collection, and those of `TOGETHER` to one."""
     from xdist.scheduler import LoadFileScheduling  # not installed where only the node's tests run
 
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return unit(str(super()._split_scope(nodeid)))
+
     config.option.loadscopereorder = False
-    return LoadFileScheduling(config, log)
+    return Scheduling(config, log)
 
 
 @pytest.hookimpl(trylast=True)
@@ -33,11 +41,19 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """The longest files first, so that all processes end together. A single process keeps pytest's order."""
     if hasattr(config, "workerinput"):
         seconds = json.loads(WEIGHTS.read_text())
-        items.sort(key=lambda item: (-seconds.get(_file(item), UNKNOWN_S), _file(item)))
+        unit_s: dict[str, float] = {}
+        for file in {_file(item) for item in items}:
+            unit_s[unit(file)] = unit_s.get(unit(file), 0.0) + seconds.get(file, UNKNOWN_S)
+        items.sort(key=lambda item: (-unit_s[unit(_file(item))], _file(item)))
 
 
 def _file(item: pytest.Item) -> str:
     return item.nodeid.partition("::")[0]
+
+
+def unit(file: str) -> str:
+    """What one process runs as a whole: a file, or all of `TOGETHER`."""
+    return TOGETHER if file.startswith(TOGETHER) else file
 
 
 def _processor_s() -> float:

@@ -116,8 +116,9 @@ def _cut_cells(table: QTableView) -> list[str]:
         for column in range(model.columnCount()):
             cell = model.index(row, column)
             if text := cell.data():
-                icon = table.iconSize().width() + _ICON_GAP_PX if cell.data(Qt.ItemDataRole.DecorationRole) else 0
-                room = QRect(0, 0, table.columnWidth(column) - padding - icon, 10_000)
+                icon = cell.data(Qt.ItemDataRole.DecorationRole)
+                left = icon.actualSize(table.iconSize()).width() + _ICON_GAP_PX if icon else 0
+                room = QRect(0, 0, table.columnWidth(column) - padding - left, 10_000)
                 font = cell.data(Qt.ItemDataRole.FontRole) or table.font()
                 needed = QFontMetrics(font).boundingRect(room, Qt.TextFlag.TextWordWrap, text)
                 if needed.height() > table.rowHeight(row) or needed.width() > room.width():

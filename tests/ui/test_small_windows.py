@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from person import wait
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QAbstractButton, QHeaderView, QLabel, QTabWidget, QWidget
+from PySide6.QtWidgets import QAbstractButton, QHeaderView, QLabel, QTabWidget, QVBoxLayout, QWidget
 from screen_pictures import cut_texts
 from test_cameras_dialog import HELD, WEBCAM, StillPreview
 from test_open_and_close import OPENERS, LendingBackend, Opener
@@ -26,6 +26,7 @@ from rhot_app.ui.dialogs.nodes_dialog import PairDialog
 from rhot_app.ui.language import LANGUAGES, tr, use_language
 from rhot_app.ui.models.palette import DARK
 from rhot_app.ui.models.words import CONDITIONS
+from rhot_app.ui.wizards.colours.paint_list import PaintList, PaintRow
 from rhot_app.ui.wizards.framework.page import RowTable
 from rhot_app.ui.wizards.framework.window import WizardWindow
 from rhot_node.files import resource_path
@@ -147,3 +148,18 @@ def test_a_dialog_that_is_waited_for_is_whole(small, qtbot, name):
     dialog.resize(dialog.size().boundedTo(SMALL))
     assert_whole(dialog, name)
     dialog.reject()
+
+
+def test_names_beside_their_colours_are_read_as_they_stand(small, qtbot):
+    """`cut_texts` itself: whole as the list lays them out, cut in a column that is a little narrower."""
+    paints = PaintList(DARK, ("marker", "hue"))
+    paints.show_rows(tuple(PaintRow(name, (200, 30, 30), "tick", "± 9°") for name in ("thumb", "middle")), "thumb")
+    frame = QWidget()
+    qtbot.addWidget(frame)
+    QVBoxLayout(frame).addWidget(paints)
+    frame.show()
+    assert cut_texts(frame) == []
+    header = paints.horizontalHeader()
+    header.setSectionResizeMode(1, QHeaderView.ResizeMode.Fixed)
+    header.resizeSection(1, header.sectionSize(1) - 8)
+    assert paints.text(1, 1) in cut_texts(frame)

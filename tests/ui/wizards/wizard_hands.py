@@ -47,17 +47,21 @@ class Hands(Person):
         self.until(self.frame.next_button.isEnabled)
         self.click(self.frame.next_button)
 
-    def record(self, seconds=0.01, picture=""):
-        """Space: a movement of so many seconds, with a picture of the page for the guide while it lasts."""
+    def record(self, seconds=0.01, picture="", times=1):
+        """Space: a movement of so many seconds, at most so many `times` while the page asks for it again, with a
+        picture of the page for the guide while it lasts."""
         step = self.window.step
         step.seconds = seconds
-        self.frame.middle.setFocus()
-        self.key(Qt.Key.Key_Space)
-        if picture:
-            self.until(lambda: step.phase == "recording")
-            self.run(0.6 * seconds)
-            self.keep(picture)
-        self.until(lambda: step.phase == "recorded", seconds + PATIENCE_S)
+        for _ in range(times):
+            self.frame.middle.setFocus()
+            self.key(Qt.Key.Key_Space)
+            if picture:
+                self.until(lambda: step.phase == "recording")
+                self.run(0.6 * seconds)
+                self.keep(picture)
+            self.until(lambda: step.phase == "recorded", seconds + PATIENCE_S)
+            if step.view().done:
+                break
 
     def solved(self, timeout_s=PATIENCE_S):
         """Wait for the result of a step that solves."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
 
 from rhot_app.geometry.transforms import inverse
 from rhot_app.objects.alignment.alignment_file import alignment_path, load_alignment
@@ -25,10 +24,7 @@ def test_the_simulated_tracker_is_aligned(simulated_rig, open_on_rig):
     hands.next()
     step = hands.window.step
     hands.until(step.seen)
-    hands.key(Qt.Key.Key_Space)
-    hands.run(12.0)
-    hands.keep("alignment-move")
-    hands.until(lambda: step.phase == "recorded", 60.0)
+    hands.record(20.0, "alignment-move", times=3)
     hands.next()
     hands.solved(120.0)
     hands.keep("alignment-result")
