@@ -1334,8 +1334,8 @@ http://192.168.1.20:8080/video oder rtsp://192.168.1.21/live</translation>
         <translation>Exportieren nach</translation>
     </message>
     <message>
-        <source>{format} (*{ending});;All files (*)</source>
-        <translation>{format} (*{ending});;Alle Dateien (*)</translation>
+        <source>{format} ({kinds});;All files (*)</source>
+        <translation>{format} ({kinds});;Alle Dateien (*)</translation>
     </message>
     <message>
         <source>Exporting to {out} …</source>

@@ -12,6 +12,7 @@ from typing import Any
 import pandas
 import pytest
 from patience import PATIENCE_MS
+from PySide6.QtWidgets import QFileDialog, QMessageBox
 from screen_pictures import check, picture_of
 
 from rhot_app.evaluation.data_sets import LOG_NAME, Order, data_set
@@ -128,3 +129,19 @@ def test_without_a_recording_one_is_asked_for(themed: Any, qtbot: Any, tmp_path:
     dialog = ExportDialog(None, tmp_path / "nowhere")
     qtbot.addWidget(dialog)
     assert dialog.log is None and not dialog.export_button.isEnabled()
+
+
+def test_a_name_without_ending_writes_over_nothing_unasked(dialog, monkeypatch, tmp_path):
+    ending = all_formats()[dialog.format].endings[0]
+    kept, asked = tmp_path / f"kept{ending}", []
+    kept.write_text("somebody's work")
+
+    def refuse(*args):
+        asked.append(str(args[2]))
+        return QMessageBox.StandardButton.No
+
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args: (str(kept.with_suffix("")), ""))
+    monkeypatch.setattr(QMessageBox, "question", refuse)
+    dialog.export_button.click()
+    assert len(asked) == 1 and str(kept) in asked[0]
+    assert kept.read_text() == "somebody's work" and dialog.export_button.text() == "Export …"

@@ -32,7 +32,7 @@ from rhot_app.export.states import HandStates, columns
 from rhot_app.hand.skeleton import FINGERS
 from rhot_app.project import Rig
 from rhot_app.ui.common.job import Job
-from rhot_app.ui.common.parts import keep_width
+from rhot_app.ui.common.parts import ask_where_to_save, keep_width
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.sentence import Sentence
 from rhot_app.ui.dialogs.recordings import newest_recording
@@ -227,16 +227,14 @@ class ExportDialog(QDialog):
             return
         if self.log is None:
             return
-        ending = all_formats()[self.format].endings[0]
-        beside = self.log.with_suffix(ending)
+        endings = all_formats()[self.format].endings
+        beside = self.log.with_suffix(endings[0])
         start = beside if self._out_folder is None else self._out_folder / beside.name
-        name, _ = QFileDialog.getSaveFileName(self, tr("Export to"), str(start),
-                                              tr("{format} (*{ending});;All files (*)", format=self.format,
-                                                 ending=ending))
-        if name:
-            out = Path(name)
-            named = out.suffix.lower() in all_formats()[self.format].endings
-            self.export(out if named else out.with_name(out.name + ending))
+        kinds = " ".join(f"*{ending}" for ending in endings)
+        out = ask_where_to_save(self, tr("Export to"), start,
+                                tr("{format} ({kinds});;All files (*)", format=self.format, kinds=kinds))
+        if out is not None:
+            self.export(out)
 
     def export(self, out: Path) -> None:
         """Write `out`; what stands there is written over, as the person was asked when choosing it."""

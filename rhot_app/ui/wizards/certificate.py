@@ -22,6 +22,7 @@ from rhot_app.ui.backend.contract import Connect
 from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext
 from rhot_app.ui.wizards.framework.movement import MovementPage, Movements, MovementStep, QuietGuide, Request
 from rhot_app.ui.wizards.framework.page import AcceptPage, ChartPage
@@ -242,7 +243,7 @@ class RodPage(MovementPage):
         self.column.insertLayout(0, form)
 
     def _name(self, said: Statements) -> None:
-        said.rod_markers = (self.upper_end.currentText(), self.lower_end.currentText())
+        said.rod_markers = (self.upper_end.currentData(), self.lower_end.currentData())
 
 
 class FlashPage(MovementPage):
@@ -340,10 +341,11 @@ class KeepPage(AcceptPage):
 
 def _marker_box(ids: tuple[str, ...], chosen: int, meaning: str, choose: Callable[[str], None]) -> QComboBox:
     box = QComboBox()
-    box.addItems(list(ids))
+    for one in ids:
+        box.addItem(marker_name(one), one)
     box.setCurrentIndex(min(chosen, len(ids) - 1))
     box.setToolTip(meaning)
-    box.currentTextChanged.connect(choose)
+    box.currentIndexChanged.connect(lambda index: choose(ids[index]))
     return box
 
 

@@ -23,6 +23,7 @@ from rhot_app.ui.backend.feed import StateFeed
 from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.wizards.framework.definition import Definition, WizardContext, accept_result
 from rhot_app.ui.wizards.framework.movement import MovementPage, Movements, MovementStep
 from rhot_app.ui.wizards.framework.page import ChartPage, shrinkable
@@ -130,8 +131,9 @@ class LiveMeters:
         if self.reading is None:
             return ()
         one = self.reading
-        return tuple((name, _text(1e3 * raw, 2), _text(1e3 * filtered, 2), _text(1e3 * lag, 1)) for name, raw, filtered,
-                     lag in zip(self.names, one.raw_jitter_m, one.jitter_m, one.lag_s, strict=True))
+        figures = zip(self.names, one.raw_jitter_m, one.jitter_m, one.lag_s, strict=True)
+        return tuple((marker_name(name), _text(1e3 * raw, 2), _text(1e3 * filtered, 2), _text(1e3 * lag, 1))
+                     for name, raw, filtered, lag in figures)
 
 
 class _Tally:
@@ -176,7 +178,7 @@ class _Visibility:
     def shortfall(self) -> str:
         """Those that were not seen."""
         names = [name for name, seen in zip(self._meters.names, self._seen, strict=False) if not seen]
-        return tr("Both cameras have not seen {names}.", names=", ".join(names)) if names else ""
+        return tr("Both cameras have not seen {names}.", names=", ".join(map(marker_name, names))) if names else ""
 
 
 class StillGuide:

@@ -15,6 +15,7 @@ from rhot_app.calibration.colour.illuminant import DriftResult, IlluminantDrift,
 from rhot_app.calibration.verdict import Finding
 from rhot_app.ui.backend.feed import Picture
 from rhot_app.ui.language import tr, tr_noop
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.wizards.framework.drawing import Callout, Dots, Layer, Overlay
 from rhot_app.ui.wizards.framework.step import AnnotatedPicture, Pictures
 from rhot_node.detect.fast import FastDetector
@@ -120,7 +121,7 @@ def mask_overlay(picture: MaskedPicture, markers: MarkerSet, chosen: int | None)
         if mark.found and chosen in (None, mark.index):
             marks.append(Dots(np.array([[mark.x, mark.y]]), "text", radius=3.0))
             further = "" if number < len(markers.markers) else "?"  # something else of the marker's colour
-            marks.append(Callout(mark.x, mark.y, markers.ids[mark.index] + further))
+            marks.append(Callout(mark.x, mark.y, marker_name(markers.ids[mark.index]) + further))
     return tuple(marks)
 
 

@@ -19,6 +19,7 @@ from rhot_app.ui.common.record_table import Column, RecordTable
 from rhot_app.ui.common.theme import app_font
 from rhot_app.ui.language import tr, tr_noop
 from rhot_app.ui.models.palette import Scheme
+from rhot_app.ui.models.rows import marker_name
 from rhot_app.ui.wizards.colours.bounds import BoundsStep, observations
 from rhot_app.ui.wizards.colours.masks import MaskMaker, drift_of
 from rhot_app.ui.wizards.framework.page import ChartView, Page
@@ -120,9 +121,9 @@ class SeparationPage(Page):
 
     def _fill(self, result: ColourResult) -> None:
         names = result.names
-        columns = [Column[ColourShares]("", lambda row: row[0])]
+        columns = [Column[ColourShares]("", lambda row: marker_name(row[0]))]
         for number, head in enumerate((*names, *result.separability.others)):
-            columns.append(Column(head, partial(self._text, number), roles=partial(self._roles, number)))
+            columns.append(Column(marker_name(head), partial(self._text, number), roles=partial(self._roles, number)))
         self.table.show_records([(name, number, shares) for number, (name, shares) in
                                  enumerate(zip(names, result.separability.matrix.tolist(), strict=True))], columns)
         header = self.table.horizontalHeader().sizeHint().height()
