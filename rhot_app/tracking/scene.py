@@ -58,7 +58,8 @@ def make_tracker(rig: Rig, *, smooth: bool = False, articulated: Sequence[Object
     used."""
     tracker = _tracker_of(rig, smooth, articulated)
     tracker.by_calibration = calibration_error(rig)
-    tracker.objects_of_markers = frozenset(one.name for one in rig.models if one.markers)
+    tracker.objects_on_exact_cameras = frozenset([*(one.name for one in rig.models if one.markers),
+                                                  *(one.name for one in articulated)])
     return tracker
 
 

@@ -111,8 +111,9 @@ class Tracker:
     by_calibration: CalibrationAccuracy = KNOWN_EXACTLY
     """What the calibration of the rig adds to the error of every place, as the rig says."""
 
-    objects_of_markers: frozenset[str] = frozenset()
-    """Names of the objects of colour markers, whose lengths do not show how far they are: they have that error, too."""
+    objects_on_exact_cameras: frozenset[str] = frozenset()
+    """Names of the objects that have that error, too: those of colour markers, whose lengths do not show how far they
+    are, and articulated ones, whose estimate takes the cameras to be where the rig says."""
 
     key_frames: KeyFrames | None = None
     """The frames that tell most of a bare hand's shape; None for a tracker without contours. Any thread may read."""
@@ -142,11 +143,11 @@ class Tracker:
             yield self.published(state)
 
     def published(self, state: HandState) -> HandState:
-        """The state with the error of the calibration in the covariances of its places. Of objects only those of colour
-        markers have it here: the others have the cameras' turns in their own estimate."""
+        """The state with the error of the calibration in the covariances of its places. Objects of
+        tags have the cameras' turns in their own estimate instead."""
         own, other = with_calibration_error(state, self.published_error(self.by_calibration)), state.other
         objects = tuple(replace(one, covariance=_of_pose(one.world_from_object, one.covariance, self.by_calibration))
-                        if one.name in self.objects_of_markers else one for one in state.objects)
+                        if one.name in self.objects_on_exact_cameras else one for one in state.objects)
         return replace(own, objects=objects, other=None if other is None else self.published(other))
 
     def published_error(self, stated: CalibrationAccuracy) -> CalibrationAccuracy:

@@ -9,6 +9,7 @@ from pictures import look_at, wall
 from synthetic_rig import EPOCH_NS
 
 from rhot_app.articulated.bodies import ANGLES
+from rhot_app.calibration.check.camera_calibration import CalibrationAccuracy
 from rhot_app.diagnostics import Diagnostics, diagnostics_of
 from rhot_app.errors import ObjectError, TrackingError
 from rhot_app.geometry.camera import CameraModel
@@ -280,6 +281,28 @@ def test_its_root_is_among_the_objects_of_a_state(smooth):
     assert sorted(followed, key=[Validity.TRACKED, Validity.PREDICTED, Validity.LOST].index) == followed
     assert len(set(followed)) == 3
     np.testing.assert_allclose(next(one for one in arms if one.tracked).world_from_object, rest_of(model)[0], atol=1e-9)
+
+
+def test_its_place_is_published_with_the_error_of_the_calibration():
+    rig, (model, bodies, _) = model_rig(), object_of("planar_arm")
+    cameras = [CameraModel.from_rig(node.intrinsics, node.pose) for node in rig.nodes]
+    process = ConstantVelocity(free_of(model))
+    track = LayeredTrack("arm", bodies, model.limits, process, cameras)
+    scene = make_tracker(rig, articulated=[track])
+    track.start(*process.start(*rest_of(model)), EPOCH_NS)
+    lens = rig.nodes[0].intrinsics
+    scene.ingest(*picture_frames(rig, [np.full((lens.height, lens.width, 3), 80, np.uint8), None], [EPOCH_NS] * 2))
+    place = rest_of(model)[0][:3, 3]
+    error = CalibrationAccuracy(5e-3, 0.6, np.array([node.pose.translation_m for node in rig.nodes]))
+    states = []
+    for frame in observations_of(rig, moving("grasp", 0.1), 0.1):
+        scene.ingest(frame)
+        states.append(scene.solve())
+    own = next(state for state in states if state is not None and state.objects[-1].tracked)
+    scene.by_calibration = error
+    more = scene.published(own).objects[-1].covariance - own.objects[-1].covariance
+    np.testing.assert_allclose(more[:3, :3], error.covariances(place), rtol=1e-3)
+    assert not more[3:, 3:].any()
 
 
 def test_a_process_predicts_and_differs_on_its_manifold():

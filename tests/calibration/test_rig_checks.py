@@ -138,6 +138,13 @@ def test_cameras_far_apart_are_not_taken_to_be_turned_further() -> None:
     assert RING.turn(np.array([1.2]))[0] == pytest.approx(2e-3 / 0.6)
 
 
+@pytest.mark.parametrize("base_m", [0.075, 0.5, 1.2])
+def test_a_turn_makes_the_error_that_it_comes_from(base_m: float) -> None:
+    accuracy = CalibrationAccuracy(2e-3, 0.6, np.array([[0.0, 0.0, 0.0], [base_m, 0.0, 0.0]]))
+    turns = np.array([0.0, *accuracy.turn(np.array([base_m]))])
+    assert accuracy.with_turns(turns, 0).turned_m == pytest.approx(2e-3)
+
+
 
 LENSES: list[tuple[str, Grade, dict[str, object]]] = [
     ("field_of_view", Grade.POOR, {"fx": 3.6, "fy": 3.6}),  # millimetres

@@ -164,7 +164,8 @@ class CalibrationAccuracy:
         """With what C cameras add that are turned by `turns` (C,) rad, rms about an axis, against `reference`, if it
         is more than before. 0: not tracked with. Cameras far apart show a distance better, and count more."""
         others = np.flatnonzero((np.arange(len(turns)) != reference) & (turns > 0.0))
-        base = np.linalg.norm(self.centres[others] - self.centres[reference], axis=1)
+        apart = np.linalg.norm(self.centres[others] - self.centres[reference], axis=1)
+        base = np.minimum(apart, self.distance_m)  # as in `turn`
         if not base.any():
             return self
         turned_m = self.distance_m**2 / float(np.sqrt(np.mean(np.square(base / turns[others]))))
